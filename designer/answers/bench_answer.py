@@ -28,23 +28,17 @@ class StopEnd(TypedDict):
 
 
 class StopRow(TypedDict):
-    """The board's own stops in a clearance."""
-
     clearance: str
     upper: NotRequired[StopEnd]
     lower: NotRequired[StopEnd]
 
 
 class OverlayRow(TypedDict):
-    """What an engine shows, and the difference by net."""
-
     response: str
     difference: Mapping[str, float | None]
 
 
 class NgspiceOverlay(OverlayRow):
-    """The same of ngspice, on the fitted or the nominal board."""
-
     fitted: bool
 
 
@@ -59,15 +53,11 @@ class FigureRow(IntervalRow):
 
 
 class PartShare(TypedDict):
-    """A part to replace, and the share of boards that are right then."""
-
     part: str
     share: float
 
 
 class AdviceRow(MechanismFrequency):
-    """What to turn."""
-
     omega: float
     expected: str
     shown: Mapping[str, float]
@@ -84,14 +74,10 @@ class AdviceRow(MechanismFrequency):
 
 
 class AdviceShown(TypedDict, total=False):
-    """Advice as a report shows it."""
-
     words: str
 
 
 class RecordKeys(MechanismFrequency):
-    """What is told of a record."""
-
     file: str
     omega: float
     response: str
@@ -108,14 +94,10 @@ class RecordShown(RecordKeys):
 
 
 class BenchShown(TypedDict):
-    """What a report shows of a board on the bench."""
-
     records: Sequence[RecordShown]
 
 
 class RecordRow(RecordKeys):
-    """What a record shows."""
-
     kind: str
     samples: int
     periods: float
@@ -139,8 +121,6 @@ class RecordRow(RecordKeys):
 
 
 class BoardRecord(TypedDict):
-    """A board as its records show it."""
-
     board: str
     files: Sequence[str]
     figures: Sequence[FigureRow]
@@ -153,16 +133,12 @@ class BoardRecord(TypedDict):
 
 
 class KindSpreadRow(IntervalRow):
-    """How far parts of a kind differ, over what is stated."""
-
     kind: str
     factor: float
     told: float
 
 
 class BenchKeys(TypedDict):
-    """What is known before ngspice is asked."""
-
     format: int
     title: str
     boards: Sequence[BoardRecord]

@@ -40,8 +40,6 @@ EndKeys = TypedDict("EndKeys", {"from": float, "to": float})
 
 
 class EndRow(ValueInSi):
-    """An end of a window, on the branch that its response lies on."""
-
     kind: str
     value: float | None
     error: float | None
@@ -50,8 +48,6 @@ class EndRow(ValueInSi):
 
 
 class WindowRow(EndKeys, EndsInSi, MisfitRows):
-    """Neighbouring steps that show one response."""
-
     track: str
     response: str
     symmetric: bool | None
@@ -67,8 +63,6 @@ class WindowRow(EndKeys, EndsInSi, MisfitRows):
 
 
 class BirthRow(TypedDict):
-    """What leaves a branch at a point."""
-
     response: str
     symmetric: bool
     side: str
@@ -79,15 +73,11 @@ ChangeKeys = TypedDict("ChangeKeys", {"from": str, "to": str})
 
 
 class ChangeRow(ChangeKeys):
-    """What one track shows before and after a point."""
-
     track: str | None
     text: str
 
 
 class PointRow(ValueInSi):
-    """A bifurcation point, or a window's end that was not located."""
-
     parameter: str
     kind: str
     value: float
@@ -113,8 +103,6 @@ class PointRow(ValueInSi):
 
 
 class TouchRow(TypedDict):
-    """The turning point that grazes a stop at a point of codimension two."""
-
     clearance: int
     side: int
     tip: bool
@@ -123,8 +111,6 @@ class TouchRow(TypedDict):
 
 
 class OtherCurveRow(TypedDict):
-    """The orbit of a point of codimension two, on the other curve that passes there."""
-
     kind: str
     n: int
     state: Sequence[float]
@@ -133,8 +119,6 @@ class OtherCurveRow(TypedDict):
 
 
 class MeetingRow(TypedDict):
-    """A point of codimension two."""
-
     kind: str
     values: Sequence[float]
     other: NotRequired[OtherCurveRow | None]
@@ -144,16 +128,12 @@ class MeetingRow(TypedDict):
 
 
 class OriginRow(TypedDict):
-    """The point of codimension two that a curve was begun at."""
-
     curve: int
     kind: str
     values: Sequence[float]
 
 
 class CurveRow(TypedDict):
-    """A bifurcation curve over two parameters."""
-
     kind: str
     response: str
     symmetric: bool
@@ -172,16 +152,12 @@ class BorderRow(TypedDict):
 
 
 class BoxRow(TypedDict):
-    """A box of equal relative half widths in both parameters."""
-
     centre: Sequence[float]
     half_widths: Sequence[float]
     share: float
 
 
 class EllipseRow(TypedDict):
-    """An ellipse of equal relative half axes in both parameters."""
-
     centre: Sequence[float]
     half_axes: Sequence[float]
     share: float
@@ -191,16 +167,12 @@ SpreadEnds = TypedDict("SpreadEnds", {"from": Sequence[float], "to": Sequence[fl
 
 
 class SpreadBoxRow(SpreadEnds):
-    """How far boards that should be equal lie from the nominal point."""
-
     share: float
     boards: int
     inside: float
 
 
 class RegionRow(TypedDict):
-    """The part of a response's region that is seen from a nominal point."""
-
     at: Sequence[float]
     response: str
     symmetric: bool
@@ -213,8 +185,6 @@ class RegionRow(TypedDict):
 
 
 class ShareStep(ShareRow):
-    """An attractor at one value, and the share of the starts that end on it."""
-
     value: float
     response: str
     symmetric: bool | None
@@ -223,15 +193,11 @@ class ShareStep(ShareRow):
 
 
 class AttractorShares(TypedDict):
-    """An attractor along a sweep."""
-
     number: int
     steps: Sequence[ShareStep]
 
 
 class SharePlanKeys(TypedDict):
-    """What decides the counted basins, beside the sweep."""
-
     starts: int
     seed: int
     box: Mapping[str, Sequence[float]]
@@ -246,22 +212,16 @@ class SharesRow(SharePlanKeys):
 
 
 class CurvePlanKeys(EndKeys):
-    """What decides the curves, beside the sweep."""
-
     name: str
     depth: int
 
 
 class SecondAxis(CurvePlanKeys, EndsInSi, SiUnitKeys):
-    """The second parameter."""
-
     at: float
     unit: NotRequired[str]
 
 
 class WorkHead(TypedDict):
-    """What all answers have."""
-
     format: int
     provenance: ProvenanceRow
     cost: dict[str, Any]
@@ -271,8 +231,6 @@ AndKey = TypedDict("AndKey", {"and": SecondAxis}, total=False)
 
 
 class SweepExtras(AndKey, total=False):
-    """What was asked for beside the sweep."""
-
     shares: SharesRow
     curves: Sequence[CurveRow]
     region: RegionRow
@@ -282,8 +240,6 @@ SweptEnds = TypedDict("SweptEnds", {"from": NotRequired[float], "to": NotRequire
 
 
 class SweepBody(SweptEnds, SiUnitKeys, SweepExtras):
-    """A sweep and its points."""
-
     parameter: str
     unit: str
     tracks: Sequence[str]
@@ -313,8 +269,6 @@ class GridBody(TypedDict):
 
 
 class MapBody(GridBody):
-    """A map."""
-
     counts: Mapping[str, int]
 
 
@@ -336,8 +290,6 @@ class AttractorRow(TypedDict):
 
 
 class BasinsBody(GridBody):
-    """Which start leads to which attractor."""
-
     at: Mapping[str, float]
     attractors: Sequence[AttractorRow]
     cells: Sequence[int]

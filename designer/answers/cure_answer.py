@@ -12,8 +12,6 @@ from designer.answers.study_answer import CountKeys
 
 
 class RareShareRow(IntervalRow):
-    """A share of boards so small that it is estimated, and not counted."""
-
     lost: float
     unseen: float
     boards: int
@@ -27,14 +25,10 @@ class MeasuredShown(IntervalRow):
 
 
 class RareShareKey(TypedDict, total=False):
-    """Of a rare loss."""
-
     rare: RareShareRow
 
 
 class MeasuredYieldRow(IntervalRow, CountKeys, RareShareKey):
-    """The same with its counts."""
-
     rate: float | None
 
 
@@ -47,8 +41,6 @@ class PlaceRow(TypedDict):
 
 
 class NetworkRow(TypedDict):
-    """Parts that one network replaces."""
-
     family: str
     parts: Sequence[str]
 
@@ -67,16 +59,12 @@ class UpgradesRow(TypedDict):
 
 
 class CuredKeys(ForceFrequency):
-    """A response, and what limits it."""
-
     omega: float
     expected: str | None
     limit: str
 
 
 class CuredResponse(CuredKeys):
-    """A response before and after."""
-
     b: float
     before: MeasuredYieldRow
     after: MeasuredYieldRow
@@ -84,15 +72,11 @@ class CuredResponse(CuredKeys):
 
 
 class TrialKeys(TypedDict):
-    """Upgrades that were measured."""
-
     price: float
     said: Sequence[str]
 
 
 class TrialRow(TrialKeys):
-    """The same with what was found."""
-
     branch: str
     upgrades: UpgradesRow
     predicted: Sequence[float]
@@ -101,28 +85,20 @@ class TrialRow(TrialKeys):
 
 
 class RefusedRow(TypedDict):
-    """Upgrades that were not built, and why."""
-
     upgrades: Sequence[str]
     why: str
 
 
 class CuredShown(CuredKeys):
-    """What a report shows of a response."""
-
     before: MeasuredShown
     after: MeasuredShown
 
 
 class TrialShown(TrialKeys):
-    """What a report shows of upgrades that were measured."""
-
     measured: Sequence[MeasuredShown]
 
 
 class CureKeys(TypedDict):
-    """What is told of a cure."""
-
     reached: bool
     why: str
     target: float

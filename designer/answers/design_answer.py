@@ -11,8 +11,6 @@ from designer.answers.shared_rows import BasePerVolt, MechanismFrequency, Proven
 
 
 class CircuitFigures(TypedDict):
-    """Of the op-amps and their supply."""
-
     opamp: str
     gain: float
     bias: float
@@ -21,8 +19,6 @@ class CircuitFigures(TypedDict):
 
 
 class GradeRow(TypedDict):
-    """A grade that nobody sells, and the one that is bought."""
-
     asked: float
     bought: float
 
@@ -36,16 +32,12 @@ class CertificateRow(TypedDict):
 
 
 class ScaleRow(TypedDict):
-    """What a second, a volt and the threshold stand for."""
-
     seconds: float
     volts: Mapping[str, float]
     threshold: float | None
 
 
 class SecondChannel(TypedDict):
-    """The generator's second channel."""
-
     amplitude_v_peak: float
     phase_deg: float
     shape: Sequence[Sequence[float]]
@@ -59,8 +51,6 @@ class ShapeKeys(TypedDict, total=False):
 
 
 class KnobRow(MechanismFrequency, BasePerVolt, ShapeKeys):
-    """The generator's settings for a response."""
-
     omega: float
     frequency_hz: float
     amplitude_v_peak: float
@@ -70,8 +60,6 @@ class KnobRow(MechanismFrequency, BasePerVolt, ShapeKeys):
 
 
 class DeadZoneRow(TypedDict):
-    """The stage that makes the first dead zone."""
-
     kind: str
     saturation: float
     threshold: float | None
@@ -93,8 +81,6 @@ class DesignCost(TypedDict, total=False):
 
 
 class RuleShown(TypedDict):
-    """A design rule and what became of it, as a report shows it."""
-
     id: str
     status: Literal["pass", "fail", "not run"]
     title: str
@@ -104,8 +90,6 @@ class RuleShown(TypedDict):
 
 
 class RuleRow(RuleShown):
-    """The same with its figures."""
-
     source: str
     scope: str
     where: str
@@ -128,8 +112,6 @@ class OrderCost(TypedDict):
 
 
 class BoardCostRow(TypedDict):
-    """What the boards of a design cost, estimated."""
-
     estimate: bool
     assembly_class: str
     area_dm2: float
@@ -139,15 +121,11 @@ class BoardCostRow(TypedDict):
 
 
 class DesignFindings(TypedDict):
-    """What is not good enough about a design."""
-
     warnings: Sequence[str]
     failed_rules: Sequence[RuleRow]
 
 
 class DesignExtras(TypedDict, total=False):
-    """What not every design has."""
-
     better_grades: Mapping[str, GradeRow]
     """Parts that are bought at a better grade than was asked for."""
     warnings: Sequence[str]
@@ -158,8 +136,6 @@ class DesignExtras(TypedDict, total=False):
 
 
 class DesignKeys(DesignExtras):
-    """Of a design, what stands in the answer of ``run`` too."""
-
     format: int
     title: str
     model: Mapping[str, Any]
@@ -180,8 +156,6 @@ class DesignKeys(DesignExtras):
 
 
 class ComparedResponseRow(TypedDict):
-    """A response on a circuit of the comparison."""
-
     omega: float
     expected: str | None
     circuit: str
@@ -201,16 +175,12 @@ class LoadRow(TypedDict):
 
 
 class LargestCurrent(TypedDict):
-    """The largest output current."""
-
     ampere: float
     section: str
     response: str
 
 
 class OffsetRow(TypedDict):
-    """Rest's shift over the threshold."""
-
     typical: float
     maximum: float
     largest: str
@@ -223,8 +193,6 @@ class PaperNames(TypedDict, total=False):
 
 
 class ComparedColumn(PaperNames):
-    """A circuit of the comparison."""
-
     name: str
     what: str
     opamp: str
@@ -254,15 +222,11 @@ class ComparedColumn(PaperNames):
 
 
 class Comparison(TypedDict):
-    """The design beside the paper's."""
-
     columns: Sequence[ComparedColumn]
     printed_in: NotRequired[Mapping[str, str]]
 
 
 class ComparisonFile(Comparison):
-    """What ``compare.json`` holds."""
-
     format: int
     title: str
     provenance: ProvenanceRow

@@ -14,8 +14,6 @@ RuleCounts = TypedDict("RuleCounts", {"pass": int, "fail": int, "not run": int})
 
 
 class RulesKeys(TypedDict):
-    """What is told of all rules."""
-
     board: str | None
     counts: RuleCounts
 

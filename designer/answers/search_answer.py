@@ -10,8 +10,6 @@ from designer.answers.study_answer import RunAnswer
 
 
 class SearchKeys(RunAnswer):
-    """A run, what was searched, and what ngspice says of it."""
-
     search: Mapping[str, Any]
     confirmation: Mapping[str, Any]
 

@@ -16,8 +16,6 @@ class IntervalRow(TypedDict):
 
 
 class ShareRow(IntervalRow):
-    """A share of some starts, and its interval."""
-
     share: float
 
 
@@ -29,8 +27,6 @@ class TrustVerdict(TypedDict):
 
 
 class Seconds(TypedDict):
-    """Wall time [s]."""
-
     seconds: float
 
 
@@ -88,8 +84,6 @@ class StopMisfit(TypedDict):
 
 
 class MisfitRows(TypedDict, total=False):
-    """Curved laws that a motion draws beyond their spans, or over few of their pieces."""
-
     beyond_range: list[SpringMisfit]
     coarse_range: list[SpringMisfit]
     beyond_depth: list[StopMisfit]

@@ -18,8 +18,6 @@ from designer.answers.shared_rows import (
 
 
 class ImpactRow(TypedDict):
-    """An impact of an orbit."""
-
     time: float
     side: Literal["upper", "lower"]
     velocity: float
@@ -28,15 +26,11 @@ class ImpactRow(TypedDict):
 
 
 class TwinRow(TypedDict):
-    """The mirror twin of an orbit: the rest follows by the mirror."""
-
     response: str
     start: Sequence[float]
 
 
 class StopReach(TypedDict):
-    """How deep an orbit goes into a stop, and how fast it meets it."""
-
     depth: float | None
     speed: float | None
     depth_m: NotRequired[float | None]
@@ -44,8 +38,6 @@ class StopReach(TypedDict):
 
 
 class ClearanceReach(TypedDict):
-    """How far an orbit goes in a clearance."""
-
     clearance: str
     upper: StopReach | None
     lower: StopReach | None
@@ -67,8 +59,6 @@ class StickingRow(TypedDict):
 
 
 class OrbitExtras(MisfitRows, total=False):
-    """What not every orbit has."""
-
     more: Sequence[Sequence[int]]
     """Impacts in further clearances, [upper, lower]."""
     x1_max_m: float | None
@@ -117,14 +107,10 @@ class OrbitRow(OrbitExtras):
 
 
 class CoexistingOrbit(OrbitRow):
-    """An orbit and its mirror twin."""
-
     twin: TwinRow | None
 
 
 class AttractorCount(ShareRow):
-    """An attractor, and how many starts end on it."""
-
     response: str
     symmetric: bool | None
     count: int
@@ -134,8 +120,6 @@ class AttractorCount(ShareRow):
 
 
 class UnsettledCount(ShareRow):
-    """Starts that did not settle."""
-
     count: int
 
 
@@ -153,8 +137,6 @@ class StartsRow(TypedDict):
 
 
 class TrustRow(TrustVerdict):
-    """The same with the figures."""
-
     rounding: float | None
     magnification: float | None
     error: float | None
@@ -162,14 +144,10 @@ class TrustRow(TrustVerdict):
 
 
 class ResponseCost(Seconds):
-    """What a response cost."""
-
     periods: int
 
 
 class ResponseRow(CoexistingOrbit, ForceFrequency):
-    """A response on one engine."""
-
     omega: float
     expected: str | None
     found: bool
@@ -181,8 +159,6 @@ class ResponseRow(CoexistingOrbit, ForceFrequency):
 
 
 class SimulateExtras(TypedDict, total=False):
-    """What not every answer has."""
-
     masses: Sequence[str]
     """This and the next one: of a file of format 2."""
     clearances: Sequence[str]

@@ -17,8 +17,6 @@ from designer.answers.shared_rows import (
 
 
 class CountKeys(TypedDict):
-    """Boards by verdict."""
-
     ok: int
     lost: int
     grazing: int
@@ -27,8 +25,6 @@ class CountKeys(TypedDict):
 
 
 class CensusKey(TypedDict, total=False):
-    """True of all boards of a list."""
-
     census: bool
 
 
@@ -43,21 +39,15 @@ class RatedCounts(YieldCounts):
 
 
 class TallyRow(RatedCounts):
-    """The same with the boards that are not ok, by outcome."""
-
     reasons: Mapping[str, int]
 
 
 class BenchTally(TallyRow):
-    """What the bench procedure finds."""
-
     steps: int
     seen_where_it_is_not: int
 
 
 class TunedRow(TallyRow):
-    """What exists within the bands."""
-
     tries: int
     unanswered: int
     followed: int
@@ -65,8 +55,6 @@ class TunedRow(TallyRow):
 
 
 class TrimmedRow(TallyRow):
-    """What boards show with their trimmers set."""
-
     at_end: int
 
 
@@ -102,8 +90,6 @@ class RecipeRow(SecondAmplitudes):
 
 
 class ReachedRow(TallyRow):
-    """What boards show from power-up by the recipe."""
-
     clipped_at_start: int
     recipe: RecipeRow
 
@@ -126,16 +112,12 @@ class QuantileRows(TypedDict):
 
 
 class MarginRows(QuantileRows):
-    """The same of the boards that are ok."""
-
     quantiles: Sequence[float]
     boards: int
     counted: Mapping[str, int]
 
 
 class AgreementCounts(TypedDict):
-    """Boards in ngspice."""
-
     asked: int
     agreed: int
     failed: int
@@ -143,35 +125,25 @@ class AgreementCounts(TypedDict):
 
 
 class LeftOutBoard(TypedDict):
-    """A board that ngspice was not asked about."""
-
     sample: int
     reason: str
 
 
 class NominalAgreement(AgreementCounts):
-    """Boards in ngspice from the nominal orbit."""
-
     too_long: NotRequired[int]
     left_out: NotRequired[Sequence[LeftOutBoard]]
 
 
 class AgreementRow(AgreementCounts):
-    """Boards in ngspice from their own orbit."""
-
     nominal_start: NotRequired[NominalAgreement]
 
 
 class DisagreementRow(IntervalRow):
-    """How often the engines differ."""
-
     count: int
     asked: int
 
 
 class StratumRow(TypedDict):
-    """Boards that were asked with one chance."""
-
     name: str
     samples: int
     asked: int
@@ -192,8 +164,6 @@ class DifferenceRow(TypedDict):
 
 
 class CombinedRow(IntervalRow):
-    """The yield by both engines."""
-
     estimate: float
     disagreement: DisagreementRow
     undecided: int
@@ -204,15 +174,11 @@ class CombinedRow(IntervalRow):
 
 
 class LimitRow(TypedDict):
-    """A way of losing a response, and how many standard deviations away it is."""
-
     what: str
     distance: float | None
 
 
 class PredictionRow(TypedDict):
-    """How well a margin foretells what became of boards."""
-
     ok: int
     lost: int
     missed: int
@@ -221,8 +187,6 @@ class PredictionRow(TypedDict):
 
 
 class ExactSubject(TypedDict):
-    """A part or a group that was made exact."""
-
     name: str
     kind: str
     avoided: int
@@ -234,8 +198,6 @@ class ExactSubject(TypedDict):
 
 
 class SobolRow(TypedDict):
-    """Sobol indices of a coordinate."""
-
     coordinate: str
     part: str
     first: float | None
@@ -245,8 +207,6 @@ class SobolRow(TypedDict):
 
 
 class CornerRow(TypedDict):
-    """The worst corner."""
-
     coordinates: Sequence[str]
     worst: Sequence[str]
     margin: float | None
@@ -257,8 +217,6 @@ class CornerRow(TypedDict):
 
 
 class AttributionRow(TypedDict):
-    """Why boards lose a response."""
-
     question: int
     lost: int
     subjects: Sequence[ExactSubject]
@@ -273,16 +231,12 @@ class AttributionRow(TypedDict):
 
 
 class AttributionCost(TypedDict):
-    """What an attribution cost."""
-
     attractors: int
     orbits: int
     seconds: float
 
 
 class AttributionRows(TypedDict):
-    """The attribution of every response."""
-
     samples: int
     seed: int
     responses: Sequence[AttributionRow]
@@ -290,8 +244,6 @@ class AttributionRows(TypedDict):
 
 
 class AttributionStatusRow(TypedDict):
-    """How much of the attribution is done."""
-
     status: str
     share: float
     budget: int | None
@@ -299,8 +251,6 @@ class AttributionStatusRow(TypedDict):
 
 
 class LossRegionRow(TypedDict):
-    """A part of the spread in which boards lose a response."""
-
     found_by: str
     becomes: str
     share: float
@@ -316,8 +266,6 @@ class ToleranceMarginRow(TypedDict):
 
 
 class RareLossKeys(TypedDict):
-    """How many boards lose a response."""
-
     lost: float
     low: float
     high: float
@@ -336,29 +284,21 @@ class RareLossKeys(TypedDict):
 
 
 class RareLossRow(RareLossKeys):
-    """The same as it is stored."""
-
     question: int
     seconds: float
 
 
 class AnyLostRow(IntervalRow):
-    """How many boards lose at least one of several responses."""
-
     least: float
     most: float
 
 
 class AxisValues(TypedDict):
-    """An axis of a yield map."""
-
     name: str
     values: Sequence[float]
 
 
 class StudyMapRow(TypedDict):
-    """A yield over a setting."""
-
     over: str
     question: int
     axes: Sequence[AxisValues]
@@ -383,8 +323,6 @@ class StudyMapRow(TypedDict):
 
 
 class FindingRow(TypedDict):
-    """A comparison of the equation check."""
-
     name: str
     deviation: float | None
     bound: float
@@ -393,8 +331,6 @@ class FindingRow(TypedDict):
 
 
 class EquationCheckRow(TypedDict):
-    """ngspice's ``.ac`` and ``.dc`` against the model."""
-
     passed: bool
     low_hz: NotRequired[float | None]
     high_hz: NotRequired[float | None]
@@ -402,8 +338,6 @@ class EquationCheckRow(TypedDict):
 
 
 class ResponseExtras(ForceFrequency, total=False):
-    """What not every response has."""
-
     exponents: Mapping[str, ExponentRow]
     """Of a motion without period, by engine."""
     rare: RareLossKeys | None
@@ -415,8 +349,6 @@ class ResponseExtras(ForceFrequency, total=False):
 
 
 class StudiedResponse(ResponseExtras):
-    """A response on each engine, and its yields."""
-
     omega: float
     expected: str | None
     found: bool
@@ -461,8 +393,6 @@ class MeasuredBoard(TypedDict):
 
 
 class OneBoardRow(TypedDict):
-    """Boards that show all responses."""
-
     built: YieldCounts | None
     tuned: YieldCounts | None
     trimmed: YieldCounts | None
@@ -476,8 +406,6 @@ class AnyLostKey(TypedDict, total=False):
 
 
 class StudyKeys(AnyLostKey):
-    """Of a study, what stands in the answer of ``run`` too."""
-
     samples: int
     boards: NotRequired[Sequence[MeasuredBoard] | None]
     until: NotRequired[float | None]

@@ -11,22 +11,16 @@ from designer.answers.shared_rows import ForceFrequency, IntervalRow, Provenance
 
 
 class NamedRow(ForceFrequency):
-    """A response by its number in the model file."""
-
     number: int
     omega: float
     b: float
 
 
 class LabelRow(NamedRow):
-    """The same with the wanted n-p-q."""
-
     expected: str | None
 
 
 class FidelityRow(LabelRow):
-    """What one fidelity at one setting shows of a response, and how far it is off."""
-
     rung: str
     level: str
     settings: Mapping[str, Any]
@@ -44,14 +38,10 @@ class FidelityRow(LabelRow):
 
 
 class TruthShown(TypedDict, total=False):
-    """What a report shows of what responses are measured against."""
-
     rung: str
 
 
 class TruthRow(LabelRow, TruthShown):
-    """What a response is measured against."""
-
     response: str
     sure: bool
     uncertainty: float | None
@@ -61,8 +51,6 @@ class TruthRow(LabelRow, TruthShown):
 
 
 class YieldDifference(IntervalRow):
-    """Yields of two engines on the same boards."""
-
     boards: int
     ok: int
     gained: int
@@ -71,8 +59,6 @@ class YieldDifference(IntervalRow):
 
 
 class BoardTradeShown(NamedRow, YieldDifference):
-    """The exact circuit against ngspice, as a report shows it."""
-
     undecided: int
     resolved: NotRequired[int]
     bandwidth: NotRequired[YieldDifference | None]
@@ -80,16 +66,12 @@ class BoardTradeShown(NamedRow, YieldDifference):
 
 
 class BoardTradeRow(BoardTradeShown):
-    """The same with what it cost."""
-
     expected: str | None
     periods: float | None
     seconds_per_board: Mapping[str, float | None]
 
 
 class LeftOutRow(LabelRow):
-    """A response whose boards were not asked."""
-
     reason: str
 
 
@@ -110,8 +92,6 @@ class CheapestShown(TypedDict):
 
 
 class CheapestRow(CheapestShown, ForceFrequency):
-    """The same with the label and the bound."""
-
     omega: float | None
     b: float | None
     expected: str | None
