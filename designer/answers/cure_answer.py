@@ -126,5 +126,3 @@ class CureAnswer(CureKeys):
     rounds: Sequence[TrialRow]
     provenance: ProvenanceRow
     cost: Seconds
-    confirmation: NotRequired[Any]
-    """In the answer of ``search MODEL``; null: no design."""

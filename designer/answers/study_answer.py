@@ -337,6 +337,14 @@ class EquationCheckRow(TypedDict):
     findings: Sequence[FindingRow]
 
 
+class LimitingRow(TypedDict):
+    mechanism: str
+    border: str
+    distance: float | None
+    shares: Mapping[str, float]
+    line: str
+
+
 class ResponseExtras(ForceFrequency, total=False):
     exponents: Mapping[str, ExponentRow]
     """Of a motion without period, by engine."""
@@ -344,8 +352,8 @@ class ResponseExtras(ForceFrequency, total=False):
     """Where that was asked for; null where the response was left out."""
     left_out: str
     """Why there is no yield."""
-    limited_by: Any
-    """Of ``search``: what limits the response; null where it was not studied."""
+    limited_by: LimitingRow | None
+    """Of ``search``; null where it was not studied."""
 
 
 class StudiedResponse(ResponseExtras):

@@ -20,7 +20,7 @@ from designer.verbs.tables import design_written, drive_cells, whole_job
 
 if TYPE_CHECKING:
     from designer.answers.cure_answer import CureAnswer
-    from designer.answers.search_answer import SearchAnswer
+    from designer.answers.search_answer import ConfirmedCure, SearchAnswer
     from designer.jobs.job_outcome import JobOutcome
     from designer.jobs.options import Options
     from designer.jobs.repair_job import CureResult
@@ -256,7 +256,7 @@ def tables(answer: SearchAnswer) -> None:
         _show_confirmation(answer["cure"])
 
 
-def _show_confirmation(cure: CureAnswer) -> None:
+def _show_confirmation(cure: ConfirmedCure) -> None:
     """What ngspice says of the repaired design's boards, where there is one."""
     if (confirmation := cure.get("confirmation")) is not None:
         pairs = zip(cure["responses"], confirmation["responses"], strict=True)

@@ -571,4 +571,5 @@ def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.M
 )
 def test_what_ngspice_bears_out(passed: bool | None, asked: int, agreed: int, held: bool) -> None:
     gate = None if passed is None else {"passed": passed}
-    assert confirms({"gate": gate, "asked": asked, "agreed": agreed}) is held
+    row: Any = {"gate": gate, "asked": asked, "agreed": agreed}
+    assert confirms(row) is held

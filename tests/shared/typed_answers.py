@@ -11,25 +11,33 @@ import pytest
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import get_type_hints, is_typeddict
 
+from designer.answers.bench_answer import BenchJson
 from designer.answers.bifurcation_answer import BasinsAnswer, MapAnswer, SweepAnswer
+from designer.answers.cure_answer import CureAnswer
 from designer.answers.design_answer import DesignAnswer
+from designer.answers.rules_answer import RulesJson
+from designer.answers.search_answer import SearchAnswer
 from designer.answers.simulate_answer import SimulateAnswer
 from designer.answers.study_answer import RunAnswer, StudyAnswer
+from designer.answers.trade_answer import TradeAnswer
 from designer.base.plain_json import plain
 from designer.cli import app
 
 TYPES: Mapping[type, frozenset[str]] = {
     SimulateAnswer: frozenset({"engine"}),
-    SweepAnswer: frozenset({"windows"}),
+    SweepAnswer: frozenset({"windows", "tracks"}),
     MapAnswer: frozenset({"counts", "x"}),
     BasinsAnswer: frozenset({"cells"}),
+    SearchAnswer: frozenset({"search", "confirmation"}),
     RunAnswer: frozenset({"parts", "samples"}),
     DesignAnswer: frozenset({"parts", "knobs"}),
     StudyAnswer: frozenset({"samples", "narrow"}),
+    CureAnswer: frozenset({"upgrades", "front"}),
+    TradeAnswer: frozenset({"rungs"}),
+    RulesJson: frozenset({"rules", "counts"}),
+    BenchJson: frozenset({"records"}),
 }
 """The first whose keys an object has is its type."""
-UNTYPED = frozenset({"search", "cure"})
-"""Keys of objects without a type yet."""
 
 
 def check_type(answer: object) -> None:
@@ -38,7 +46,7 @@ def check_type(answer: object) -> None:
     value = plain(answer)
     kinds = (kind for kind, keys in TYPES.items() if value.keys() >= keys)
     kind = next(kinds, None)
-    if kind is not None and not UNTYPED & value.keys():
+    if kind is not None:
         assert_type(value, kind)
 
 
