@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from designer.base.rare_words import boards_text
+from designer.answers.rare_words import boards_text
 from designer.base.si_unit import drive_text
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
+from designer.answers.rare_words import boards_at
 from designer.base.page import (
     Block,
     Columns,
@@ -23,7 +24,6 @@ from designer.base.page import (
     table,
     titled,
 )
-from designer.base.rare_words import boards_at
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from designer.base.attribution_noise import lacks_noise
-from designer.base.rare_words import any_lost_words, boards_text, share_text
+from designer.answers.attribution_noise import lacks_noise
+from designer.answers.rare_words import any_lost_words, boards_text, share_text
 from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table

@@ -18,11 +18,11 @@ from zlib import crc32
 import numpy as np
 from scipy.special import ndtri
 
+from designer.answers.rare_words import boards_text
 from designer.base.arrays import Array
 from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import inverse_binomial, wilson
-from designer.base.rare_words import boards_text
 from designer.spread.tilted_cube import TiltedCube
 from designer.verdicts.verdict import StudyPlan
 from designer.yields.drawn_boards import BLOCK, Drawing, Sample
