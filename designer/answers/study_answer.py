@@ -356,7 +356,11 @@ class ResponseExtras(ForceFrequency, total=False):
     """Of ``search``; null where it was not studied."""
 
 
-class StudiedResponse(ResponseExtras):
+YieldKey = TypedDict("YieldKey", {"yield": YieldCounts | None})
+"""As built; null where the response was left out."""
+
+
+class StudyResponse(ResponseExtras, YieldKey):
     omega: float
     expected: str | None
     found: bool
@@ -378,13 +382,6 @@ class StudiedResponse(ResponseExtras):
     blame: NotRequired[AttributionRow | None]
     trust: NotRequired[Mapping[str, TrustVerdict | None]]
     """By engine, and of the yield."""
-
-
-YieldKey = TypedDict("YieldKey", {"yield": YieldCounts | None})
-
-
-class StudyResponse(StudiedResponse, YieldKey):
-    """The same with the yield as built; null where the response was left out."""
 
 
 class MeasuredBoard(TypedDict):
