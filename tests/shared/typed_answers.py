@@ -28,7 +28,7 @@ TYPES: Mapping[type, frozenset[str]] = {
     SweepAnswer: frozenset({"windows", "tracks"}),
     MapAnswer: frozenset({"counts", "x"}),
     BasinsAnswer: frozenset({"cells"}),
-    SearchAnswer: frozenset({"search", "confirmation"}),
+    SearchAnswer: frozenset({"search", "confirmation", "parts"}),
     RunAnswer: frozenset({"parts", "samples"}),
     DesignAnswer: frozenset({"parts", "knobs"}),
     StudyAnswer: frozenset({"samples", "narrow"}),
