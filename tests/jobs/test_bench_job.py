@@ -18,6 +18,7 @@ from designer.jobs import bench_job
 from designer.verbs.bench import bench, channels_of
 from designer.workbench import naming
 from tests.shared.paper_cases import synthesised
+from tests.shared.typed_answers import check_type
 from tests.workbench.stored_records import stored
 
 
@@ -113,6 +114,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     for net in ("v1", "fv"):
         assert wave[net] == pytest.approx(exact[net], abs=0.02)
     assert result.answer["records"] == [record]
+    check_type(result.answer)
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
@@ -144,6 +146,7 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
         files.append(csv_of(number, tmp_path / name / "v1.csv"))
     out = tmp_path / "out"
     result = bench(folder, files, boards=True, out=out)
+    check_type(result.answer)
     first, second = result.answer["boards"]
     assert (first["board"], second["board"]) == ("A", "B")
     assert not first["doubtful"]
