@@ -19,6 +19,7 @@ from hypothesis import settings
 from tests.shared.answer_store import during, open_store
 from tests.shared.blank_figures import blank_figures
 from tests.shared.this_process import in_this_process
+from tests.shared.typed_answers import printed_answers_checked
 
 # Many processes read the same sources: without bytecode files each compiles all of them anew.
 sys.dont_write_bytecode = False
@@ -115,6 +116,13 @@ def one_process() -> Iterator[None]:
     """``tests/base/test_second_process.py`` takes it back, and so does all that starts a verb as a
     process."""
     with in_this_process():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def answers_are_typed() -> Iterator[None]:
+    """What a verb prints is of its type."""
+    with printed_answers_checked():
         yield
 
 

@@ -468,8 +468,8 @@ class Folder:
         elif (self / name).exists():
             yield name
 
-    def json(self, name: str) -> dict[str, Any]:
-        """The object in one of the folder's JSON files.
+    def json(self, name: str) -> Any:
+        """The object in one of the folder's JSON files, of a type of ``answers``.
 
         Raises
         ------

@@ -29,7 +29,7 @@ from designer.base.printed import printable, tell
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID
 
-Show = Callable[[Mapping[str, Any]], None]
+Show = Callable[[Any], None]
 """Takes an answer while the work goes on: of a design once its parts stand, of a study once the
 yields of the exact circuit stand, where ngspice is asked after that, and once all yields stand,
 where attribution or maps take time after that."""

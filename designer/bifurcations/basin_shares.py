@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from designer.dynamics.orbit import MOST_COUNTED, Motion, Orbit, OrbitStatus
 from designer.dynamics.steady_state import UPPER, DrivenSystem, TransientSettings, stopped
 from designer.kernels.kernel_orbit import CHAOS
 from designer.kernels.kernel_sweep import ALIGN, SPAN
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import SharePlanKeys, SharesRow, ShareStep
 
 BLOCK = 16
 """Values of a block."""
@@ -81,7 +84,7 @@ class SharePlan:
         """The values, cut into blocks."""
         return [self.values[k : k + BLOCK] for k in range(0, len(self.values), BLOCK)]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> SharePlanKeys:
         """What decides the result, beside the sweep."""
         box = dict(zip(self.subject.states, self.box.tolist(), strict=True))
         course = dict(self.course.__dict__)
@@ -131,7 +134,7 @@ class BasinShares:
                 out.setdefault(share.attractor, []).append((value, share))
         return dict(sorted(out.items()))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> SharesRow:
         """Plain data by the keys of the contract."""
         return {
             **self.plan.as_dict(),
@@ -146,7 +149,7 @@ class BasinShares:
         """Limits of a share, at 95 % (Wilson)."""
         return wilson(count, len(self.plan.numbers))
 
-    def _row(self, value: float, share: AttractorShare) -> dict[str, Any]:
+    def _row(self, value: float, share: AttractorShare) -> ShareStep:
         low, high = self.interval(share.count)
         return {
             "value": value,

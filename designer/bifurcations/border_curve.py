@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
 from designer.base.record_check import read_record
@@ -12,6 +12,9 @@ from designer.bifurcations.curve_switch import OtherCurve, other_curve, read_oth
 from designer.bifurcations.plane_curves import PlaneCurve
 from designer.bifurcations.points import PointKind
 from designer.dynamics.counts import period_of
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import CurveRow, MeetingRow, OriginRow
 
 FOLLOWED, NO_OTHER, NOT_BUILT = "followed", "no other curve", "not built"
 UNSTABLE, DEEPER, LOST = "unstable orbits only", "deeper than asked for", "no convergence"
@@ -33,7 +36,7 @@ class CurveMeeting:
     status: str = ""
     """What became of the other curve; "" before all curves are followed."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> MeetingRow:
         """Plain, for JSON."""
         return {
             "kind": self.name,
@@ -55,7 +58,7 @@ class CurveOrigin:
     values: tuple[float, float]
     """Values of both parameters."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> OriginRow:
         """Plain, for JSON."""
         return {"curve": self.curve, "kind": self.name, "values": list(self.values)}
 
@@ -95,7 +98,7 @@ class BorderCurve:
             tuple(CurveMeeting(*each) for each in met),
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> CurveRow:
         """Plain, for JSON."""
         return {
             "kind": self.kind,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -33,6 +33,9 @@ from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.windows import WindowEnd, window
 from designer.dynamics.orbit import MOST_COUNTED, Orbit
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import CurvePlanKeys
 
 BLOCKS = 8
 """Blocks that the curves through the sweep's points are kept in: point number k belongs to block k
@@ -60,7 +63,7 @@ class CurvePlan:
     depth: int = CURVE_DEPTH
     """How many times in a row another curve is begun at a point of codimension two."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> CurvePlanKeys:
         """What decides the result, beside the sweep."""
         low, high = self.window.second
         return {"name": self.second, "from": low, "to": high, "depth": self.depth}

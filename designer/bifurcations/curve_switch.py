@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, followed, system_at
 from designer.bifurcations.points import PointKind
 from designer.dynamics.counts import Counts
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import OtherCurveRow, TouchRow
 
 CRITICAL = 1e-4
 """How far outside the unit circle a multiplier may lie that counts as one on it: two that are one
@@ -62,9 +65,9 @@ class OtherCurve:
     size: float = 0.0
     """Peak of the displacement in its clearance."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> OtherCurveRow:
         """The curve as plain data for JSON."""
-        touch = None
+        touch: TouchRow | None = None
         if self.touch is not None:
             touch = {
                 "clearance": self.touch.clearance,

@@ -7,6 +7,7 @@ kept.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -15,6 +16,7 @@ from designer.base.errors import InputError
 from designer.dynamics.flow import Flow
 
 Key = TypeVar("Key")
+_keeping = threading.Lock()
 MOST_FLOWS = 8
 """Flows that a family remembers."""
 ASIDE = 1e-3
@@ -128,7 +130,9 @@ class FlowPlane:
 
 
 def _remembered(flows: dict[Key, Flow], key: Key, flow: Flow) -> Flow:
-    """The flow, kept in the place of the oldest."""
-    while len(flows) >= MOST_FLOWS:
-        flows.pop(next(iter(flows)))
-    return flows.setdefault(key, flow)
+    """The flow, kept in the place of the oldest: of several threads one at a time, since two that
+    drop the same one do not both find it."""
+    with _keeping:
+        while len(flows) >= MOST_FLOWS:
+            flows.pop(next(iter(flows)))
+        return flows.setdefault(key, flow)

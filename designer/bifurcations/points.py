@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
@@ -32,6 +33,9 @@ from designer.bifurcations.orbit_curve import CONVERGED, Curve
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE
 from designer.dynamics.turning_points import heights
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import BirthRow, PointRow
 
 ROUNDING = 1e-11
 """Of the parameter's size: no error is stated below it. Where an orbit stalled before
@@ -68,7 +72,7 @@ class Birth:
     stable: bool
     """Whether they are stable there."""
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> BirthRow:
         """Plain, for JSON."""
         return {
             "response": self.response,
@@ -131,9 +135,9 @@ class Bifurcation:
             return None
         return {self.direction: self.stable[1], -self.direction: self.stable[0]}
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> PointRow:
         """Plain, for JSON."""
-        return {
+        row: PointRow = {
             "parameter": self.parameter,
             "kind": str(self.kind),
             "value": self.value,
@@ -150,8 +154,10 @@ class Bifurcation:
             "stable_below": None if self.stable_sides is None else self.stable_sides[-1],
             "side": SIDES.get(self.side),
             "born": None if self.born is None else self.born.as_dict(),
-            **({"stops": self.stops} if self.stops else {}),
         }
+        if self.stops:
+            row["stops"] = self.stops
+        return row
 
 
 def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:

@@ -10,19 +10,23 @@ two neighbouring rays the border is taken as straight.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from designer.base.arrays import Array
+from designer.base.plain_json import plain
 from designer.base.threads import parallel
 from designer.bifurcations.flow_family import Family, FlowPlane
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.windows import window
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import RegionRow, SpreadBoxRow
 
 RAYS = 72
 """Straight ways from the point to the border; eight of them lead along axes and diagonals."""
@@ -88,7 +92,7 @@ class SpreadBox:
         within = shapely.contains_xy(shapely.Polygon(border), places)
         return cls((a, b), (c, d), HELD, len(places), float(within.mean()))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> SpreadBoxRow:
         """Plain, for JSON."""
         return {
             "from": list(self.low),
@@ -124,7 +128,7 @@ class ResponseRegion:
     spread: SpreadBox | None = None
     """The box of the boards' spread about the nominal point, where boards differ in both."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> RegionRow:
         """Plain, for JSON."""
         return {
             "at": list(self.at),
@@ -134,10 +138,10 @@ class ResponseRegion:
                 {"values": values, "kind": kind}
                 for values, kind in zip(self.border.tolist(), self.kinds, strict=True)
             ],
-            "around": asdict(self.around),
-            "best": asdict(self.best),
-            "ellipse_around": asdict(self.ellipse_around),
-            "ellipse_best": asdict(self.ellipse_best),
+            "around": plain(self.around),
+            "best": plain(self.best),
+            "ellipse_around": plain(self.ellipse_around),
+            "ellipse_best": plain(self.ellipse_best),
             "spread": None if self.spread is None else self.spread.as_dict(),
         }
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import UPPER, SteadyMotion, TransientSettings
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import WindowRow
 
 BLOCK = 64
 """Steps of a block."""
@@ -105,18 +108,19 @@ class Window:
     lyapunov_error: float | None = None
     """Largest standard error of these exponents; None of others."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> WindowRow:
         """Plain data by the keys of the contract."""
-        chaos = {"lyapunov": self.lyapunov, "lyapunov_error": self.lyapunov_error}
-        return {
+        row: WindowRow = {
             "from": self.low,
             "to": self.high,
             "response": self.response,
             "symmetric": self.symmetric,
             "steps": self.steps,
             "track": self.track,
-            **(chaos if self.lyapunov is not None else {}),
         }
+        if self.lyapunov is not None:
+            row["lyapunov"], row["lyapunov_error"] = self.lyapunov, self.lyapunov_error
+        return row
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from designer.base.threads import parallel
 from designer.bifurcations import branch_survey
@@ -25,6 +26,9 @@ from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, WindowEnd, 
 from designer.dynamics import attractors
 from designer.dynamics.counts import period_of
 from designer.dynamics.orbit import Orbit
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import EndRow
 
 LEAST_STEPS, LONGEST = 4, 4
 """Of a window whose ends are looked for: steps, and period."""
@@ -62,10 +66,12 @@ class SweptEnd:
     reason: str = ""
     """Why it was not located or not looked for, in words."""
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> EndRow:
         """Plain data by the keys of the contract."""
-        reason = {"reason": self.reason} if self.reason else {}
-        return {"kind": self.kind, "value": self.value, "error": self.error, **reason}
+        row: EndRow = {"kind": self.kind, "value": self.value, "error": self.error}
+        if self.reason:
+            row["reason"] = self.reason
+        return row
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from designer.base.units import spaced_quantity
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import RuleRow
 
 Scope = Literal["circuit", "board"]
 Status = Literal["pass", "fail", "not run"]
@@ -100,7 +103,7 @@ class RuleOutcome:
     own_do: str = ""
     """``Finding.do`` of the worst."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> RuleRow:
         """The outcome by the keys of docs/contract.md, and more."""
         changed = self.override is not None
         limit = self.limit_text

@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from math import ceil
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import bdtrc
 
+from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import TAIL, mid_p
 from designer.check import checked_design
@@ -28,6 +29,9 @@ from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
 from designer.yields.tuned_yield import benched_block
 from designer.yields.yield_count import Yield
+
+if TYPE_CHECKING:
+    from designer.answers.cure_answer import MeasuredYieldRow, RareShareKey
 
 MOST = 8000
 """Boards of a study at which it gives up."""
@@ -242,11 +246,11 @@ class MeasuredYield:
         left = unseen_share(lost, asked)
         return replace(self, rare=replace(self.rare, unseen=min(left, self.rare.unseen)))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> MeasuredYieldRow:
         """Plain data for JSON."""
         low, high = self.interval
-        more = {} if self.rare is None else {"rare": asdict(self.rare)}
         rate = self.counts.rate if self.rare is None else self.rate
+        more: RareShareKey = {} if self.rare is None else {"rare": plain(self.rare)}
         return {**self.counts.counts, "rate": rate, "low": low, "high": high, **more}
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
 from designer.base.plain_json import FORMAT
@@ -12,13 +11,17 @@ from designer.centering.repair_trial import Repair, Trial
 from designer.model.model_file import ModelFile
 from designer.model.si_units import hertz_json
 
+if TYPE_CHECKING:
+    from designer.answers.cure_answer import CureAnswer, CuredResponse, TrialRow
+    from designer.answers.shared_rows import ProvenanceRow
+
 COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
 
 
-def repair_json(repair: Repair, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+def repair_json(repair: Repair, provenance: ProvenanceRow, seconds: float) -> CureAnswer:
     """Everything that was found. Prices are over the design as it is, in euro."""
     best, file = repair.best, repair.base.modelfile
-    responses = [
+    responses: list[CuredResponse] = [
         {
             "omega": r.omega,
             **hertz_json(r.omega, file.si),
@@ -51,7 +54,7 @@ def repair_json(repair: Repair, provenance: Mapping[str, Any], seconds: float) -
         "rounds": [_trial(t, file) for t in repair.rounds],
         "front": [_trial(t, file) for t in repair.front],
         "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in repair.refused],
-        "provenance": dict(provenance),
+        "provenance": provenance,
         "cost": {"seconds": seconds},
     }
 
@@ -78,7 +81,7 @@ def front_csv(repair: Repair) -> str:
     return csv_text(COLUMNS, rows)
 
 
-def _trial(t: Trial, file: ModelFile) -> dict[str, Any]:
+def _trial(t: Trial, file: ModelFile) -> TrialRow:
     return {
         "branch": t.branch,
         "price": t.price,

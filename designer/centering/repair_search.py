@@ -16,9 +16,9 @@ from functools import partial
 
 import numpy as np
 
+from designer.answers.rare_words import boards_text
 from designer.base.defaults import cores
 from designer.base.progress import Progress, best_so_far, seeking
-from designer.base.rare_words import boards_text
 from designer.centering.limiting_parts import joint_boards, limiting
 from designer.centering.repair_branch import TRIM, TRIMMER, Refused, RepairBranch, branches
 from designer.centering.repair_couplings import finest

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
-from designer.base.rare_words import boards_text
+from designer.answers.rare_words import boards_text
 from designer.base.si_unit import drive_text
 
+if TYPE_CHECKING:
+    from designer.answers.cure_answer import CureAnswer, MeasuredYieldRow, TrialRow
 
-def text(answer: Mapping[str, Any]) -> str:
+
+def text(answer: CureAnswer) -> str:
     """The answer, yields before and after, rounds and the front, as lines of text.
 
     answer : the JSON object of ``repair_json``.
@@ -42,7 +44,7 @@ def text(answer: Mapping[str, Any]) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _responses(answer: Mapping[str, Any]) -> list[str]:
+def _responses(answer: CureAnswer) -> list[str]:
     out = []
     for r in answer["responses"]:
         place = drive_text(r["omega"], r.get("frequency_hz"))
@@ -53,20 +55,20 @@ def _responses(answer: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _upgrades(trial: Mapping[str, Any]) -> str:
+def _upgrades(trial: TrialRow) -> str:
     return "; ".join(trial["said"]) or "as it is"
 
 
-def _rate(m: Mapping[str, Any]) -> float:
+def _rate(m: MeasuredYieldRow) -> float:
     return 0.0 if m["rate"] is None else float(m["rate"])
 
 
-def _yield(m: Mapping[str, Any]) -> str:
+def _yield(m: MeasuredYieldRow) -> str:
     if m["rate"] is None:
         return "not shown"
     if rare := m.get("rare"):
-        keys = ("lost", "low", "high", "unseen")
-        lost, low, high, unseen = (boards_text(1e6 * rare[key]) for key in keys)
+        shares = rare["lost"], rare["low"], rare["high"], rare["unseen"]
+        lost, low, high, unseen = (boards_text(1e6 * share) for share in shares)
         return f"{lost} of a million lost ({low} to {high}; at most {unseen} that no search met)"
     text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
     return text + (f", {m['failed']} failed" if m["failed"] else "")

@@ -10,8 +10,8 @@ is ``[board] dc_trim``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile
 from designer.model.response_table import placed
 from designer.synthesis import output_loads, side_conditions
+
+if TYPE_CHECKING:
+    from designer.answers.cure_answer import PlaceRow, UpgradesRow
 
 
 @dataclass(frozen=True)
@@ -101,9 +104,11 @@ class Upgrades:
             phrases.append(f"DC offset trimmed on each board, ± {100.0 * self.trim:g} %")
         return phrases
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> UpgradesRow:
         """Plain data for JSON; responses are counted from 1."""
-        places = [{"response": i + 1, **asdict(p)} for i, p in sorted(self.places.items())]
+        places: list[PlaceRow] = [
+            {"response": i + 1, "omega": p.omega, "b": p.b} for i, p in sorted(self.places.items())
+        ]
         return {
             "opamp": self.opamp,
             "dead_zone": self.dead_zone,
@@ -112,11 +117,11 @@ class Upgrades:
             "places": places,
             "trim": self.trim,
             "trimmer": self.trimmer,
-            "networks": [asdict(n) for n in self.networks],
+            "networks": [{"family": n.family, "parts": n.parts} for n in self.networks],
         }
 
     @classmethod
-    def of_dict(cls, record: Mapping[str, Any]) -> Upgrades:
+    def of_dict(cls, record: UpgradesRow) -> Upgrades:
         """The upgrades that ``as_dict`` wrote."""
         return cls(
             opamp=record["opamp"],

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from scipy.special import ndtr
 
@@ -20,14 +20,26 @@ from designer.model.si_units import mechanism_json
 from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict
 from designer.verdicts.verdict import Answer, Verdict
 
+if TYPE_CHECKING:
+    from designer.answers.search_answer import (
+        AskedDesign,
+        AskedFidelity,
+        CandidateRow,
+        ChoiceRow,
+        ConfirmedRow,
+        ContributionRow,
+        ObjectiveRow,
+        SearchResultKeys,
+        SurvivorKeys,
+    )
+
 Rank = tuple[float, float] | None
 
 
-def search_json(result: SearchResult) -> dict[str, Any]:
+def search_json(result: SearchResult) -> SearchResultKeys:
     """``search.json``: the levers, what each contributed, what was tried, what is predicted."""
     si = result.synthesis.modelfile.si
     return {
-        "format": 1,
         "seed": result.seed,
         "stream": STREAM,
         "stretches": list(LADDER),
@@ -49,8 +61,8 @@ def search_json(result: SearchResult) -> dict[str, Any]:
             for s in result.steps
         ],
         "contributions": [_contribution(c) for c in result.contributions],
-        "bandwidth": _checks(result, BANDWIDTH, "bandwidth"),
-        "ngspice": _checks(result, FIDELITY, "ngspice"),
+        "bandwidth": _checks(result, BANDWIDTH, lambda count: {"bandwidth": count}),
+        "ngspice": _checks(result, FIDELITY, lambda count: {"ngspice": count}),
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
             for row in result.windows
@@ -58,16 +70,18 @@ def search_json(result: SearchResult) -> dict[str, Any]:
     }
 
 
-def _checks(result: SearchResult, fidelity: str, survivors: str) -> dict[str, Any]:
-    """What a fidelity was asked about. survivors : key of the boards that it keeps."""
-    designs = [
+def _checks(
+    result: SearchResult, fidelity: str, survivors: Callable[[int], SurvivorKeys]
+) -> AskedFidelity:
+    """What a fidelity was asked about. survivors : the boards that it keeps, by their key."""
+    designs: list[AskedDesign] = [
         {
             "frequency_hz": row.frequency,
             "kept": row.adopted,
             "responses": [
                 {
                     "exact": a.exact,
-                    survivors: a.survivors,
+                    **survivors(a.survivors),
                     "unanswered": a.unanswered,
                     "borne_out": a.borne_out,
                 }
@@ -85,13 +99,13 @@ def confirmation_json(
     answers: Mapping[tuple[int, int], Answer],
     response_of: Sequence[int],
     responses: int,
-) -> list[dict[str, Any]]:
+) -> list[ConfirmedRow]:
     """How ngspice's fidelity judges boards of the study, by response.
 
     response_of : for each question the index of its response; a response that was left out has no
     question.
     """
-    out: list[dict[str, Any]] = []
+    out: list[ConfirmedRow] = []
     for index in range(responses):
         pairs = [
             (h, answers[h.sample, h.question]) for h in checks if response_of[h.question] == index
@@ -122,7 +136,7 @@ def confirmation_json(
     return out
 
 
-def _choice(choice: DesignChoice) -> dict[str, Any]:
+def _choice(choice: DesignChoice) -> ChoiceRow:
     return {
         "opamp": choice.opamp,
         "dead_zone": choice.dead_zone,
@@ -133,7 +147,7 @@ def _choice(choice: DesignChoice) -> dict[str, Any]:
     }
 
 
-def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
+def _candidate(candidate: Candidate, si: SiScales | None) -> CandidateRow:
     return {
         "max_error": candidate.design.errors.max_error,
         "threshold_v": candidate.design.errors.scales.threshold,
@@ -153,7 +167,7 @@ def _candidate(candidate: Candidate, si: SiScales | None) -> dict[str, Any]:
     }
 
 
-def _rank(rank: Rank) -> dict[str, Any]:
+def _rank(rank: Rank) -> ObjectiveRow:
     if rank is None or not math.isfinite(rank[0]):
         return {"smallest_distance": None, "smallest_yield": None, "product": None}
     return {
@@ -163,7 +177,7 @@ def _rank(rank: Rank) -> dict[str, Any]:
     }
 
 
-def _contribution(c: Contribution) -> dict[str, Any]:
+def _contribution(c: Contribution) -> ContributionRow:
     return {
         "lever": c.lever,
         "from": c.start,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +25,10 @@ from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse, scale_of
 from designer.model.mechanics import MechanicalModel, state_names
 from designer.spread import random_streams
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import ShareRow
+    from designer.answers.simulate_answer import StartsRow
 
 MOST_STARTS = 100_000
 NEAR = 1e-6
@@ -66,7 +70,7 @@ class Coexistence:
     not_settled: int
     """Starts that did not settle on an attractor."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> StartsRow:
         """The attractors by the keys of the contract."""
         return {
             "count": self.starts,
@@ -80,7 +84,9 @@ class Coexistence:
                     "symmetric": b.orbit.symmetric,
                     "count": b.count,
                     "on_twin": b.twins,
-                    **dict(zip(("x1_min", "x1_max"), _reach(b.orbit), strict=True)),
+                    # No extremes of one that has no period.
+                    "x1_min": float(b.orbit.extremes[0, 0]) if b.orbit.n else None,
+                    "x1_max": float(b.orbit.extremes[0, 1]) if b.orbit.n else None,
                     **self._share(b.count),
                 }
                 for b in self.basins
@@ -88,17 +94,9 @@ class Coexistence:
             "not_settled": {"count": self.not_settled, **self._share(self.not_settled)},
         }
 
-    def _share(self, count: int) -> dict[str, float]:
+    def _share(self, count: int) -> ShareRow:
         low, high = wilson(count, self.starts)
         return {"share": count / self.starts, "low": low, "high": high}
-
-
-def _reach(orbit: Orbit) -> tuple[float | None, float | None]:
-    """Least and largest displacement of the first mass; None where there is no orbit."""
-    if not orbit.n:
-        return None, None
-    low, high = orbit.extremes[0].tolist()
-    return low, high
 
 
 def check(starts: int) -> None:

@@ -7,10 +7,10 @@ its end. A motion beyond it, or over a small part of it, meets another law than 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from designer.laws.law_elements import NonlinearElement, SmoothLaw
 from designer.model.lumped_elements import Gap
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import MisfitRows
 
 POINTS = 200
 """Points of a drive period. A wave of the drive's tenth harmonic is missed by at most 1.2 %
@@ -54,12 +57,8 @@ class LawMisfit:
         return self.reached > self.span
 
     @property
-    def kind(self) -> str:
-        """Its key in JSON."""
-        return f"{'beyond' if self.beyond else 'coarse'}_{'range' if self._spring else 'depth'}"
-
-    @property
-    def _spring(self) -> bool:
+    def spring(self) -> bool:
+        """Whether the law is a cubic spring's."""
         return len(self.where) == 2
 
     def text(self, response: str, *, in_si: bool) -> str:
@@ -69,7 +68,7 @@ class LawMisfit:
             value_text(x, "m") if in_si else f"{x:.4g}" for x in (self.reached, self.span)
         )
         name, more = "range", "points"
-        if self._spring:
+        if self.spring:
             one, other = self.where
             drawn = f"draws the cubic spring between {one} and {other} to {reached}"
         else:
@@ -82,22 +81,29 @@ class LawMisfit:
         few = f"of the {name} of {span}, where few {more} stand for the law and the force is {off}"
         return f"{response} {drawn} {few}: state more {more}, or a smaller {name}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """The misfit as plain data for JSON."""
-        own = {"between": self.where} if self._spring else {"clearance": self.where[0]}
-        span = {"range" if self._spring else "depth": self.span}
-        return {**own, **span, "reached": self.reached, "error": self.error}
 
-
-def misfits_json(misfits: Iterable[LawMisfit]) -> dict[str, Any]:
+def misfits_json(misfits: Iterable[LawMisfit]) -> MisfitRows:
     """Misfits by their kinds, for JSON; nothing without any."""
-    kinds: dict[str, Any] = {}
+    rows: MisfitRows = {}
     for each in misfits:
-        kinds.setdefault(each.kind, []).append(each.as_dict())
-    return kinds
+        reached, error = each.reached, each.error
+        if each.spring:
+            of_spring: Literal["beyond_range", "coarse_range"]
+            of_spring = "beyond_range" if each.beyond else "coarse_range"
+            rows.setdefault(of_spring, []).append(
+                {"between": each.where, "range": each.span, "reached": reached, "error": error}
+            )
+        else:
+            of_stops: Literal["beyond_depth", "coarse_depth"]
+            of_stops = "beyond_depth" if each.beyond else "coarse_depth"
+            (name,) = each.where
+            rows.setdefault(of_stops, []).append(
+                {"clearance": name, "depth": each.span, "reached": reached, "error": error}
+            )
+    return rows
 
 
-def misfits_in(answer: Mapping[str, Any]) -> Iterator[LawMisfit]:
+def misfits_in(answer: MisfitRows) -> Iterator[LawMisfit]:
     """The misfits that stand in the JSON object of a response."""
     for each in (*answer.get("beyond_range", ()), *answer.get("coarse_range", ())):
         yield LawMisfit(tuple(each["between"]), each["range"], each["reached"], each["error"])

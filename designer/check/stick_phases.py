@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,9 @@ from designer.dynamics.orbit import ANSWERS, Orbit
 from designer.laws.law_elements import Friction
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
+
+if TYPE_CHECKING:
+    from designer.answers.simulate_answer import OrbitRow
 
 POINTS = 1000
 """Of a drive period: a phase that is shorter than one of the stretches between them is not met."""
@@ -95,6 +97,6 @@ def _sticking(name: str, holds: Array, creep: float, *, periodic: bool) -> Stick
     return Sticking(name, periods, len(lengths), float(holds.mean()), longest, creep)
 
 
-def sticking_in(answer: Mapping[str, Any]) -> tuple[Sticking, ...]:
+def sticking_in(answer: OrbitRow) -> tuple[Sticking, ...]:
     """Those that stand in the JSON object of a response."""
     return tuple(Sticking(**each) for each in answer.get("sticking") or ())

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from designer.dynamics.flow_result import FlowResult, FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateResult
 from designer.spice.simulator import SimulationFailed
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import TrustVerdict
+    from designer.answers.simulate_answer import TrustRow
 
 ROUNDING = 2.0**-53
 """Of a number in double precision."""
@@ -73,11 +77,11 @@ class Trust:
         """With the figures; empty without a doubt."""
         return f"{WORDS}: {'; '.join(map(str, self.doubts))}" if self.doubts else ""
 
-    def verdict(self) -> dict[str, Any]:
+    def verdict(self) -> TrustVerdict:
         """Without the figures, which no two machines share: equal studies are equal files."""
         return {"trusted": self.trusted, "reasons": list(self.reasons)}
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> TrustRow:
         """With the figures, in the reasons too."""
         return {
             "trusted": self.trusted,

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
+from designer.answers.rare_words import any_lost_words, boards_at, loss_words
 from designer.base.design_folder import MODEL, TOLERANCE, Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import reading
-from designer.base.rare_words import any_lost_words, boards_at, loss_words
 from designer.base.si_unit import drive_text
 from designer.explorer.place import first_place
 from designer.explorer.wire import Message
 from designer.folders.model_source import design_inputs_of
 from designer.model.model_file import ModelFile
 from designer.model.response_table import Response
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import RareLossKeys, StudyAnswer, StudyResponse
 
 
 @dataclass(frozen=True)
@@ -73,23 +76,23 @@ def _found(modelfile: ModelFile, folder: Folder) -> FolderLosses | None:
         return _read(study, modelfile)
 
 
-def _read(study: Mapping[str, Any], modelfile: ModelFile) -> FolderLosses | None:
+def _read(study: StudyAnswer, modelfile: ModelFile) -> FolderLosses | None:
     each = zip(modelfile.responses, study["responses"], strict=True)
-    asked = [(spec, response) for spec, response in each if response.get("rare")]
+    asked = [(spec, row, found) for spec, row in each if (found := row.get("rare"))]
     if not asked:
         return None
     origin, own = study["provenance"], modelfile.model.b
     words = (
         "Estimated by tolerance --rare for the parts of this folder, boards "
-        f"{boards_at(origin['spread']['temperature'])}, seed {origin['seed']}."
+        f"{boards_at((origin['spread'] or {})['temperature'])}, seed {origin['seed']}."
     )
     if any_lost := study.get("any_lost"):
         words += f" {any_lost_words(any_lost)}."
     shown = first_place(modelfile).model.b
-    return FolderLosses(words, shown, tuple(_row(*pair, own) for pair in asked))
+    return FolderLosses(words, shown, tuple(_row(*one, own) for one in asked))
 
 
-def _row(spec: Response, response: Mapping[str, Any], own: float) -> ResponseLosses:
+def _row(spec: Response, response: StudyResponse, rare: RareLossKeys, own: float) -> ResponseLosses:
     omega, b = float(response["omega"]), own if spec.b is None else spec.b
     if isinstance(b, tuple):
         raise ValueError("a response of the model file that leaves b open")
@@ -97,4 +100,4 @@ def _row(spec: Response, response: Mapping[str, Any], own: float) -> ResponseLos
     if b != own:
         place += f", b = {b:.6g}"
     wanted = response["expected"] or response["model"]
-    return ResponseLosses(omega, b, f"{wanted} at {place}", loss_words(response["rare"]))
+    return ResponseLosses(omega, b, f"{wanted} at {place}", loss_words(rare))

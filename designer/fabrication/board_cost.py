@@ -7,8 +7,8 @@ the price of their class (docs/fabrication.md). Nothing here is a quotation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 from designer.base.errors import InputError
 from designer.base.views import View
@@ -19,6 +19,9 @@ from designer.board.footprints import footprint
 from designer.board.kicad_placement import place
 from designer.catalog.entries import BuildCost
 from designer.catalog.parts_catalog import Catalog
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import BoardCostRow, OrderCost
 
 Assembly = Literal["surface", "mixed", "through hole"]
 """How the parts are soldered: all on the surface, some of them through holes, or all of them."""
@@ -70,9 +73,16 @@ class BoardCost:
         """All together [€]."""
         return self.parts + self.bare_board + self.assembly
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> OrderCost:
         """Plain data by the keys of docs/contract.md."""
-        return {**asdict(self), "total": self.total}
+        return {
+            "boards": self.boards,
+            "parts": self.parts,
+            "bare_board": self.bare_board,
+            "assembly": self.assembly,
+            "listed": self.listed,
+            "total": self.total,
+        }
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,7 @@ class CostEstimate:
     costs: tuple[BoardCost, ...]
     """One for each size of order that the catalogue knows, ascending."""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> BoardCostRow:
         """Plain data by the keys of docs/contract.md."""
         return {
             "estimate": True,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from designer.dynamics.orbit import WITHOUT_PERIOD, Orbit, OrbitStatus
 from designer.fidelity.fidelity_answers import CIRCUIT, MODEL, RK4, TOP, FidelityAnswer, Truths
 from designer.model.find_responses import ModelResponse
 from designer.verdicts.exact_circuit import images, waveform_error
+
+if TYPE_CHECKING:
+    from designer.answers.trade_answer import LabelRow
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,14 @@ class ResponseLabel:
         """The label of response number ``number``."""
         return cls(number, response.omega, response.b, response.expected)
 
-    def as_dict(self) -> dict[str, Any]:
-        """``number``, ``omega``, ``b`` and ``expected``."""
-        return asdict(self)
+    def as_dict(self) -> LabelRow:
+        """Plain data by the keys of the contract."""
+        return {
+            "number": self.number,
+            "omega": self.omega,
+            "b": self.b,
+            "expected": self.expected,
+        }
 
 
 BOARD, EQUATIONS = "board", "equations"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from markupsafe import Markup
 from matplotlib.axes import Axes
@@ -29,8 +29,22 @@ from designer.fidelity.fidelity_errors import BOARD, EQUATIONS, FidelityError, T
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BandwidthYield, BoardTrade, LeftOut
 from designer.model.model import SiScales
-from designer.model.si_units import hertz_json
 from designer.spice.opamp_model import MODELS
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import ProvenanceRow
+    from designer.answers.trade_answer import (
+        BoardTradeRow,
+        BoardTradeShown,
+        CheapestRow,
+        CheapestShown,
+        FidelityRow,
+        NamedRow,
+        TradeAnswer,
+        TruthRow,
+        TruthShown,
+        YieldDifference,
+    )
 
 NONE = "–"
 UNITS = (
@@ -63,17 +77,17 @@ _OTHER = ("#555555", "X")
 
 def trade_json(
     result: Trade,
-    provenance: Mapping[str, Any],
+    provenance: ProvenanceRow,
     seconds: float,
     title: str,
     si: SiScales | None = None,
-) -> dict[str, Any]:
+) -> TradeAnswer:
     """``fidelities``, ``cheapest``, ``truths``, ``boards`` and ``left_out``.
 
     si : each row of a response also gets ``frequency_hz``, of the mechanism's force.
     """
     boards = [r.boards for r in result.responses]
-    document = {
+    document: TradeAnswer = {
         "format": FORMAT,
         "title": title,
         "rungs": [_row(row, r.truth) for r in result.responses for row in r.rows],
@@ -83,16 +97,24 @@ def trade_json(
             {**b.label.as_dict(), "reason": b.reason} for b in boards if isinstance(b, LeftOut)
         ],
         "cheapest": [_cheapest(c) for c in result.cheapest],
-        "provenance": dict(provenance),
+        "provenance": provenance,
         "cost": {"seconds": seconds},
     }
-    of_a_response = (row for rows in document.values() if isinstance(rows, list) for row in rows)
-    for row in of_a_response:
-        row |= hertz_json(row["omega"], None if row["omega"] is None else si)
-    return dict(plain(document))
+    rows: list[NamedRow | CheapestRow] = [
+        *document["rungs"],
+        *document["truths"],
+        *document["boards"],
+        *document["left_out"],
+        *document["cheapest"],
+    ]
+    for row in rows:
+        if si is not None and row["omega"] is not None:
+            row["frequency_hz"] = si.hertz(row["omega"])
+    answer: TradeAnswer = plain(document)
+    return answer
 
 
-def _row(row: FidelityError, truth: Truth) -> dict[str, Any]:
+def _row(row: FidelityError, truth: Truth) -> FidelityRow:
     """No fidelity has an error against itself: what its steps differ by is its convergence."""
 
     def against(errors: Mapping[str, float], of: str) -> float:
@@ -117,7 +139,7 @@ def _row(row: FidelityError, truth: Truth) -> dict[str, Any]:
     }
 
 
-def _truth(truth: Truth) -> dict[str, Any]:
+def _truth(truth: Truth) -> TruthRow:
     return {
         **truth.label.as_dict(),
         "rung": truth.rung,
@@ -130,12 +152,17 @@ def _truth(truth: Truth) -> dict[str, Any]:
     }
 
 
-def _boards(b: BoardTrade) -> dict[str, Any]:
+def _boards(b: BoardTrade) -> BoardTradeRow:
     difference, low, high = b.difference
-    counts = {k: v for k, v in b.__dict__.items() if k not in ("label", "seconds", "bandwidth")}
     return {
         **b.label.as_dict(),
-        **counts,
+        "boards": b.boards,
+        "ok": b.ok,
+        "gained": b.gained,
+        "lost": b.lost,
+        "undecided": b.undecided,
+        "periods": b.periods,
+        "resolved": b.resolved,
         "difference": difference,
         "low": low,
         "high": high,
@@ -144,15 +171,26 @@ def _boards(b: BoardTrade) -> dict[str, Any]:
     }
 
 
-def _with_bandwidth(b: BandwidthYield) -> dict[str, Any]:
+def _with_bandwidth(b: BandwidthYield) -> YieldDifference:
     difference, low, high = b.difference
-    return {**b.__dict__, "difference": difference, "low": low, "high": high}
-
-
-def _cheapest(c: Cheapest) -> dict[str, Any]:
-    label = dict.fromkeys(("number", "omega", "b", "expected"))
     return {
-        **(label if c.label is None else c.label.as_dict()),
+        "boards": b.boards,
+        "ok": b.ok,
+        "gained": b.gained,
+        "lost": b.lost,
+        "difference": difference,
+        "low": low,
+        "high": high,
+    }
+
+
+def _cheapest(c: Cheapest) -> CheapestRow:
+    label = c.label
+    return {
+        "number": None if label is None else label.number,
+        "omega": None if label is None else label.omega,
+        "b": None if label is None else label.b,
+        "expected": None if label is None else label.expected,
         "question": c.question,
         "of": c.of,
         "rung": c.rung,
@@ -166,12 +204,12 @@ def _cheapest(c: Cheapest) -> dict[str, Any]:
     }
 
 
-def name(row: Mapping[str, Any]) -> str:
+def name(row: NamedRow) -> str:
     """A response as people are told of it: its number, ω and b."""
     return f"{row['number']}: {drive_text(row['omega'], row.get('frequency_hz'))}, b = {row['b']:g}"
 
 
-def sheet(answer: Mapping[str, Any]) -> str:
+def sheet(answer: TradeAnswer) -> str:
     """trade.md: the cheapest fidelity for each question, then every fidelity, from the JSON
     object."""
     head = [
@@ -182,13 +220,13 @@ def sheet(answer: Mapping[str, Any]) -> str:
         Markup(
             "The cheapest rung and setting that answers each question, for all responses together, "
             "and against what its error is measured: `board` is the nominal circuit with "
-            f"{truth_words(answer)} in ngspice at the finest step, `equations` the exact flow of "
-            "the model, `ideal` ngspice with ideal op-amps on the same boards. Where the bound is "
-            "not kept by any rung, the one that comes nearest is named. A setting of ngspice that "
-            "did not pass the numerics gate is never named; the board itself is, by what its two "
-            "finest steps differ by, where nothing less will do."
+            f"{truth_words(answer['truths'])} in ngspice at the finest step, `equations` the exact "
+            "flow of the model, `ideal` ngspice with ideal op-amps on the same boards. Where the "
+            "bound is not kept by any rung, the one that comes nearest is named. A setting of "
+            "ngspice that did not pass the numerics gate is never named; the board itself is, by "
+            "what its two finest steps differ by, where nothing less will do."
         ),
-        cheapest_table(answer),
+        cheapest_table(answer["cheapest"], responses=len(answer["truths"])),
         UNITS,
     ]
     sections = [PageSection("By response", _by_response(answer))]
@@ -200,28 +238,28 @@ def sheet(answer: Mapping[str, Any]) -> str:
     return markdown(Page(f"Time and error: {answer['title']}", head, sections))
 
 
-def _boards_asked(answer: Mapping[str, Any]) -> int:
+def _boards_asked(answer: TradeAnswer) -> int:
     return int(answer["provenance"]["settings"]["trade"]["boards"])
 
 
-def truth_words(answer: Mapping[str, Any]) -> str:
+def truth_words(truths: Sequence[TruthShown]) -> str:
     """The op-amps that stand for the board's."""
-    vendor = any(t.get("rung") == VENDOR for t in answer["truths"])
+    vendor = any(t.get("rung") == VENDOR for t in truths)
     return "the vendor's macromodel of the op-amps" if vendor else "full op-amps"
 
 
-def cheapest_table(answer: Mapping[str, Any]) -> Table | None:
-    """What answers each question, of all responses together. answer : the JSON object."""
-    alone = len(answer["truths"]) == 1
+def cheapest_table(cheapest: Sequence[CheapestShown], *, responses: int) -> Table | None:
+    """What answers each question, of all responses together. responses : how many there are."""
     rows = []
-    for c in answer["cheapest"]:
-        if c["number"] is not None and not alone:
+    for c in cheapest:
+        if c["number"] is not None and responses != 1:
             continue
         shown = {True: "yes", False: "no", None: NONE}[c["shown"]]
         fidelity = [NONE] * 4
         if c["rung"]:
-            fidelity = [TITLES[c["rung"]], c["level"], _measured(c, "measured")]
-            fidelity.append(_measured(c, "convergence"))
+            errors = c.get("measured"), c.get("convergence")  # earlier versions had no convergence
+            fidelity = [TITLES[c["rung"]], c["level"] or NONE]
+            fidelity += [_measured(c["question"], error) for error in errors]
         seconds = _short(c["seconds"]) if c["rung"] else NONE
         rows.append((c["question"], c["of"], *fidelity, shown, seconds, c["note"]))
     columns = (
@@ -231,7 +269,7 @@ def cheapest_table(answer: Mapping[str, Any]) -> Table | None:
     return table(columns, rows)
 
 
-def _by_response(answer: Mapping[str, Any]) -> list[Block]:
+def _by_response(answer: TradeAnswer) -> list[Block]:
     truths = answer["truths"]
     by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
     rows = [
@@ -250,9 +288,9 @@ def _by_response(answer: Mapping[str, Any]) -> list[Block]:
     ]
 
 
-def board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+def board_blocks(boards: Sequence[BoardTradeShown]) -> list[Block]:
     """What both engines say of the same boards. boards : of the JSON object."""
-    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    columns: dict[str, Callable[[BoardTradeShown], str]] = {
         "response": name,
         "boards": lambda b: str(b["boards"]),
         "ok": lambda b: str(b["ok"]),
@@ -271,23 +309,21 @@ def board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
         "asked: those that one of them left undecided count as ok on the exact circuit alone "
         "for its upper end, and in ngspice alone for its lower end.",
         table_of(boards, columns),
-        *_bandwidth_blocks([b for b in boards if b.get("bandwidth")]),
+        *_bandwidth_blocks([(b, with_it) for b in boards if (with_it := b.get("bandwidth"))]),
     ]
 
 
-def _bandwidth_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+def _bandwidth_blocks(boards: Sequence[tuple[NamedRow, YieldDifference]]) -> list[Block]:
     if not boards:
         return []
-    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
-        "response": name,
-        "boards": lambda b: str(b["bandwidth"]["boards"]),
-        "ok": lambda b: str(b["bandwidth"]["ok"]),
-        "only with": lambda b: str(b["bandwidth"]["gained"]),
-        "only without": lambda b: str(b["bandwidth"]["lost"]),
-        "difference": lambda b: _percent(b["bandwidth"]["difference"]),
-        "interval": lambda b: (
-            f"{_percent(b['bandwidth']['low'])} to {_percent(b['bandwidth']['high'])}"
-        ),
+    columns: dict[str, Callable[[tuple[NamedRow, YieldDifference]], str]] = {
+        "response": lambda b: name(b[0]),
+        "boards": lambda b: str(b[1]["boards"]),
+        "ok": lambda b: str(b[1]["ok"]),
+        "only with": lambda b: str(b[1]["gained"]),
+        "only without": lambda b: str(b[1]["lost"]),
+        "difference": lambda b: _percent(b[1]["difference"]),
+        "interval": lambda b: f"{_percent(b[1]['low'])} to {_percent(b[1]['high'])}",
     }
     return [
         "What no engine with ideal op-amps sees: the yield of the exact circuit with bandwidth "
@@ -296,13 +332,13 @@ def _bandwidth_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
     ]
 
 
-def _measured(c: Mapping[str, Any], key: str) -> str:
-    if c.get(key) is None:  # earlier versions knew no convergence
+def _measured(question: str, error: float | None) -> str:
+    if error is None:
         return NONE
-    return f"{c[key]:.0f} wrong" if c["question"] == RESPONSE else _percent(c[key])
+    return f"{error:.0f} wrong" if question == RESPONSE else _percent(error)
 
 
-def _cell(row: Mapping[str, Any] | None) -> str:
+def _cell(row: FidelityRow | None) -> str:
     if row is None:
         return NONE
     error = _percent(row["error"])
@@ -325,7 +361,8 @@ def _short(value: float | None) -> str:
     return f"{float(f'{value:.2g}'):.10g}"
 
 
-KEYS = {"trade": "error", "trade-numerics": "numerical_error"}
+ErrorKey = Literal["error", "numerical_error"]
+KEYS: dict[str, ErrorKey] = {"trade": "error", "trade-numerics": "numerical_error"}
 """Pictures, and which error each shows."""
 _AXES = {
     "error": "RMS error of x₁ / peak,\nagainst the board",
@@ -336,7 +373,7 @@ _PALE = 0.3
 
 
 @styled
-def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
+def front(answer: TradeAnswer, key: ErrorKey = "error") -> Figure:
     """Error over the time of a drive period, a panel for each response; hollow where the n-p-q is
     not the board's, pale where ngspice's setting did not pass the gate. What the error is measured
     against is not shown.
@@ -345,9 +382,9 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     "numerical_error", against the exact flow of the fidelity's own equations, or where there is
     none its convergence, so that fidelities do not compete.
     """
+    rungs = answer["rungs"]
     if key == "numerical_error":
-        known = [{**row, key: row[key] or row["convergence"]} for row in answer["rungs"]]
-        answer = {**answer, "rungs": known}
+        rungs = [{**row, "numerical_error": row[key] or row["convergence"]} for row in rungs]
     truths = answer["truths"]
     columns = min(3, len(truths))
     rows = -(-len(truths) // columns)
@@ -356,7 +393,7 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     for axes in grid[len(truths) :]:
         axes.set_visible(False)
     # Neither none nor exactly 0: those are not on the axes.
-    shown = [row for row in answer["rungs"] if row[key] and row["seconds_per_period"]]
+    shown = [row for row in rungs if row[key] and row["seconds_per_period"]]
     for i, (axes, truth) in enumerate(zip(grid, truths, strict=False)):
         _panel(axes, [row for row in shown if row["number"] == truth["number"]], key)
         axes.set_title(f"{name(truth)}: {truth['response']}", loc="left")
@@ -382,12 +419,12 @@ def _mark(colour: str, marker: str, label: str, **look: Any) -> Line2D:
     return Line2D([], [], ls="", marker=marker, color=colour, ms=5, label=label, **look)
 
 
-def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
+def _panel(axes: Axes, rows: Sequence[FidelityRow], key: ErrorKey) -> None:
     points = []
     for row in rows:
         colour, marker = _LOOKS.get(row["rung"], _OTHER)
         right, passed = row["right"][BOARD], row["gate"] is not False
-        at = row["seconds_per_period"], row[key]
+        at = float(row["seconds_per_period"] or 0.0), float(row[key] or 0.0)
         face, alpha = colour if right else "white", None if passed else _PALE
         axes.plot(*at, ls="", marker=marker, ms=5, color=colour, mfc=face, alpha=alpha, zorder=3)
         if right and passed:

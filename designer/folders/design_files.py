@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -38,6 +38,10 @@ from designer.model.find_responses import find, peaks
 from designer.model.model_file import ModelFile, errors_in
 from designer.spice import deck
 from designer.spread.part_grades import better_grades
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import DesignAnswer
+    from designer.answers.shared_rows import ProvenanceRow
 
 SETUP = "setup.csv"
 WAVEFORMS = "waveform.csv", "waveform2.csv"
@@ -120,20 +124,20 @@ def renew_bills(folder: Folder, synthesis: Synthesis) -> None:
             folder.rewrite(name, text)
 
 
-def answer(synthesis: Synthesis) -> dict[str, Any]:
+def answer(synthesis: Synthesis) -> DesignAnswer:
     """The JSON object of ``design.json``."""
     return _answer(synthesis, subject_of(synthesis), cost_or_none(synthesis))
 
 
 def _answer(
     synthesis: Synthesis, subject: RuleSubject | InputError, cost: CostEstimate | None
-) -> dict[str, Any]:
+) -> DesignAnswer:
     found = findings(synthesis, subject)
     document = chosen(synthesis)
     return {**document, "board_cost": None if cost is None else cost.as_dict(), **found}
 
 
-def chosen(synthesis: Synthesis) -> dict[str, Any]:
+def chosen(synthesis: Synthesis) -> DesignAnswer:
     """Of ``answer``, what is known as soon as the parts are chosen."""
     document = synthesis_json(
         synthesis.modelfile,
@@ -143,12 +147,12 @@ def chosen(synthesis: Synthesis) -> dict[str, Any]:
         synthesis.seconds,
         better_grades(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog),
     )
-    if synthesis.stage_reason:
-        document["dead_zone"]["reason"] = synthesis.stage_reason
+    if synthesis.stage_reason and (stage := document["dead_zone"]):
+        stage["reason"] = synthesis.stage_reason
     return {**document, "warnings": list(error_warnings(synthesis))}
 
 
-def design_provenance(synthesis: Synthesis) -> dict[str, Any]:
+def design_provenance(synthesis: Synthesis) -> ProvenanceRow:
     return provenance(synthesis.modelfile, synthesis.catalog.hash, settings={"highs": SOLVER})
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from designer.model.driven import model_flow
 from designer.report import words
 from designer.report.design_tables import spring_of
 from designer.synthesis.parts_choice import ways_to_less_error
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import DesignFindings
 
 FINDINGS = {"warnings", "failed_rules"}
 """The keys."""
@@ -48,7 +51,7 @@ def judged(synthesis: Synthesis, subject: RuleSubject | InputError) -> Synthesis
     return replace(synthesis, outcomes=outcomes)
 
 
-def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> dict[str, Any]:
+def findings(synthesis: Synthesis, subject: RuleSubject | InputError) -> DesignFindings:
     """``warnings`` and ``failed_rules`` by the keys of docs/contract.md. subject : ``subject_of``
     the design.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MEASURED, MODEL, Folder
 from designer.base.manifest import Stages, object_hash
@@ -20,6 +20,9 @@ from designer.folders.design_findings import FINDINGS, findings, subject_of
 from designer.folders.model_source import design_inputs_of, source
 from designer.model.model_file import ModelFile
 from designer.spread.part_grades import once_otherwise
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import DesignAnswer, DesignFindings
 
 GRADES = "grades"
 """Among a design's inputs where the bill once held other grades than the study drew."""
@@ -36,19 +39,19 @@ def read_design(
     return load(folder, modelfile, catalog)
 
 
-def design_answer(folder: Folder) -> dict[str, Any]:
+def design_answer(folder: Folder) -> DesignAnswer:
     """The JSON object of a folder's design; with the findings that older versions did not write,
     judged now."""
-    document = folder.json(DESIGN)
+    document: DesignAnswer = folder.json(DESIGN)
     if document.keys() >= FINDINGS:
         return document
-    return document | _findings(folder.path, object_hash(document))
+    return {**document, **_findings(folder.path, object_hash(document))}
 
 
 @lru_cache(maxsize=4)
-def _findings(path: Path, _hash: str) -> dict[str, Any]:
+def _findings(path: Path, _hash: str) -> DesignFindings:
     """Of a design that was written without them; a run asks more than once."""
-    found: dict[str, Any] = plain(findings(design := read_design(path), subject_of(design)))
+    found: DesignFindings = plain(findings(design := read_design(path), subject_of(design)))
     return found
 
 

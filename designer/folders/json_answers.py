@@ -7,13 +7,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from designer.base.plain_json import FORMAT, plain
 from designer.dynamics.drive_shape import SINE
-from designer.dynamics.piecewise_linear import SecondDrive
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.answers.design_answer import (
+        DeadZoneRow,
+        DesignAnswer,
+        DesignExtras,
+        DesignKeys,
+        GradeRow,
+        KnobRow,
+        ShapeKeys,
+    )
+    from designer.answers.shared_rows import ProvenanceRow
+    from designer.answers.simulate_answer import (
+        ClearanceReach,
+        CoexistingOrbit,
+        OrbitExtras,
+        OrbitRow,
+        ResponseRow,
+        SimulateAnswer,
+        SimulateExtras,
+        StopReach,
+        TwinRow,
+    )
+    from designer.answers.study_answer import RunAnswer, RunCost, StudyAnswer, StudyKeys
     from designer.base.arrays import Array
     from designer.check.simulation import Simulated
     from designer.circuit.design import Design, GeneratorSetting
@@ -34,19 +55,19 @@ def synthesis_json(
     modelfile: ModelFile,
     design: Design,
     responses: Sequence[ModelResponse],
-    provenance: Mapping[str, Any],
+    provenance: ProvenanceRow,
     seconds: float,
     better_grades: Mapping[str, BetterGrade] | None = None,
-) -> dict[str, Any]:
+) -> DesignAnswer:
     """What ``synthesise`` prints and ``design.json`` holds.
 
     better_grades : parts that are bought at a better grade than was asked for; the key is left
     out where there are none.
     """
     from designer.circuit.design import settings
-    from designer.model.si_units import base_json, mechanism_json
 
     errors, circuit = design.errors, design.circuit
+    better: DesignExtras = {"better_grades": _plain_grades(better_grades)} if better_grades else {}
     return {
         "format": FORMAT,
         "title": modelfile.title,
@@ -60,28 +81,17 @@ def synthesis_json(
         },
         "parts": circuit.values,
         "composites": design.composites,
-        **({"better_grades": _plain_grades(better_grades)} if better_grades else {}),
+        **better,
         "errors": errors.errors,
         "max_error": errors.max_error,
-        "certificate": design.certificate,
+        "certificate": plain(design.certificate),
         "scales": {
             "seconds": errors.scales.seconds,
             "volts": _by_state(errors.scales.volts),
             "threshold": errors.scales.threshold,
         },
         "knobs": [
-            {
-                "omega": s.omega,
-                "frequency_hz": s.frequency_hz,
-                **mechanism_json(s.omega, modelfile.si),
-                **base_json(s.base, modelfile.si),
-                "amplitude_v_peak": s.amplitude_v_peak,
-                "offset_v": s.offset_v,
-                **({} if s.shape == SINE else {"shape": [list(wave) for wave in s.shape]}),
-                **({} if s.second is None else {"second": _second(s, s.second)}),
-                "expected": r.expected,
-                "found": r.found,
-            }
+            _knob(s, r, modelfile.si)
             for s, r in zip(settings(design, responses), responses, strict=True)
         ],
         "dead_zone": _dead_zone(design),
@@ -93,31 +103,46 @@ def synthesis_json(
     }
 
 
-def _second(setting: GeneratorSetting, second: SecondDrive) -> dict[str, Any]:
-    """The generator's second channel, ahead of the first by its phase."""
+def _knob(s: GeneratorSetting, response: ModelResponse, si: SiScales | None) -> KnobRow:
+    from designer.model.si_units import base_json, mechanism_json
+
+    shapes: ShapeKeys = {} if s.shape == SINE else {"shape": s.shape}
+    if s.second is not None:
+        shapes["second"] = {
+            "amplitude_v_peak": s.second.amplitude,
+            "phase_deg": s.excitation.second_phase_deg,
+            "shape": s.second.shape,
+        }
     return {
-        "amplitude_v_peak": second.amplitude,
-        "phase_deg": setting.excitation.second_phase_deg,
-        "shape": [list(wave) for wave in second.shape],
+        "omega": s.omega,
+        "frequency_hz": s.frequency_hz,
+        **mechanism_json(s.omega, si),
+        **base_json(s.base, si),
+        "amplitude_v_peak": s.amplitude_v_peak,
+        "offset_v": s.offset_v,
+        **shapes,
+        "expected": response.expected,
+        "found": response.found,
     }
 
 
-def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, float]]:
+def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, GradeRow]:
     return {name: {"asked": g.wanted, "bought": g.bought} for name, g in better.items()}
 
 
-def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
+def cost_of(file: Mapping[str, Any]) -> Any:
     """The object ``cost`` of a file; empty where somebody took it out: its hash leaves it out."""
     cost = file.get("cost")
     return dict(cost) if isinstance(cost, Mapping) else {}
 
 
-def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, Any]:
+def run_json(design: DesignAnswer, study: StudyAnswer) -> RunAnswer:
     """What ``run`` prints, from the objects of the two files."""
-    cost = {"design": cost_of(design), "study": cost_of(study)}
+    cost: RunCost = {"design": cost_of(design), "study": cost_of(study)}
+    rest = cast("StudyKeys", {key: study.get(key) for key in STUDY_KEYS if key in study})
     return {
-        **design,
-        **{key: study[key] for key in STUDY_KEYS if key in study},
+        **cast("DesignKeys", design),
+        **rest,
         "equation_check": study.get("equation_check"),
         "responses": study["responses"],
         "provenance": study["provenance"],
@@ -128,176 +153,160 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
 def simulate_json(
     simulated: Sequence[Simulated],
     engine: str,
-    provenance: Mapping[str, Any],
+    provenance: ProvenanceRow,
     seconds: float,
     si: SiScales | None = None,
-) -> dict[str, Any]:
+) -> SimulateAnswer:
     """What ``simulate`` prints; with ``si`` also what that is in SI units."""
-    from designer.model.si_units import hertz_json
-
-    masses = simulated[0].masses if simulated else ()
+    names: SimulateExtras = {}
+    if simulated and simulated[0].masses:
+        names = {"masses": simulated[0].masses, "clearances": simulated[0].clearances}
     return {
         "format": FORMAT,
         "engine": engine,
-        **({"masses": masses, "clearances": simulated[0].clearances} if masses else {}),
-        "responses": [
-            {
-                "omega": s.omega,
-                **hertz_json(s.omega, si),
-                "expected": s.expected,
-                "found": s.found,
-                **_response_json(s, 0, si),
-                "others": [_response_json(s, i + 1, si) for i in range(len(s.others))],
-                "starts": None if s.coexistence is None else s.coexistence.as_dict(),
-                "engine": s.settings,
-                "trust": s.trust.as_dict(),
-                "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
-            }
-            for s in simulated
-        ],
+        **names,
+        "responses": [_response_json(s, si) for s in simulated],
         "provenance": provenance,
         "cost": {"seconds": seconds},
     }
 
 
-def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> dict[str, Any]:
+def _response_json(s: Simulated, si: SiScales | None) -> ResponseRow:
+    from designer.model.si_units import hertz_json
+
+    return {
+        "omega": s.omega,
+        **hertz_json(s.omega, si),
+        "expected": s.expected,
+        "found": s.found,
+        **_coexisting(s, 0, si),
+        "others": [_coexisting(s, i + 1, si) for i in range(len(s.others))],
+        "starts": None if s.coexistence is None else s.coexistence.as_dict(),
+        "engine": s.settings,
+        "trust": s.trust.as_dict(),
+        "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
+    }
+
+
+def _coexisting(simulated: Simulated, number: int, si: SiScales | None) -> CoexistingOrbit:
     """The orbit (number 0) or one of the others. Masses with names are those of a file of format 2,
     whose plain numbers are the SI values already."""
-    orbit = (simulated.orbit, *simulated.others)[number]
-    twin = _twin_json(simulated.twins[number] if simulated.twins else None)
-    if not simulated.masses:
-        own = {**orbit_json(orbit, si), **_frequencies_hz(orbit, si)}
-        return {**own, **_in_clearances(simulated, orbit, si), "twin": twin}
-    answer = {**orbit_json(orbit), **_frequencies_hz(orbit, si)}
     from designer.check.curved_laws import misfits_json
 
-    is_known = simulated.absolute and len(simulated.absolute[number])
-    x = simulated.absolute[number][0::2] if is_known else None
-    low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
-    answer |= {
-        "x1_max": None if high is None else high[0],
-        "x1_min": None if low is None else low[0],
-        "x_max": high,
-        "x_min": low,
-        **_from_base(simulated, number),
-        **_in_clearances(simulated, orbit),
-        **misfits_json(simulated.misfits[number] if simulated.misfits else ()),
-        **_sticking(simulated, number),
-        "twin": twin,
-    }
-    for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
-        impact["clearance"] = simulated.clearances[stop]
-    return answer
+    orbit = (simulated.orbit, *simulated.others)[number]
+    twin = simulated.twins[number] if simulated.twins else None
+    beside = None if simulated.masses else si
+    row = orbit_json(orbit, beside)
+    if si is not None and orbit.frequencies:
+        row["frequencies_hz"] = [si.hertz(omega) for omega in orbit.frequencies]
+    if simulated.masses:
+        for impact, stop in zip(row["impacts"], orbit.impact_clearances, strict=True):
+            impact["clearance"] = simulated.clearances[stop]
+        high, low = _reach(simulated.absolute[number] if simulated.absolute else None)
+        row["x1_max"], row["x1_min"] = (None, None) if not high or not low else (high[0], low[0])
+        row["x_max"], row["x_min"] = high, low
+    if simulated.base:
+        spans = simulated.from_base
+        high, low = _reach(spans[number] if spans else orbit.extremes)
+        row["from_base_max"], row["from_base_min"] = high, low
+        row["base_amplitude"] = simulated.base
+    if simulated.clearances:
+        row["in_clearances"] = _in_clearances(simulated, orbit, beside)
+    row = {**row, **misfits_json(simulated.misfits[number] if simulated.misfits else ())}
+    held = simulated.sticking[number] if simulated.sticking else ()
+    if held != ():
+        row["sticking"] = plain(held)
+    # What else the twin is follows by the mirror.
+    mirrored: TwinRow | None = (
+        None if twin is None else {"response": twin.response, "start": twin.start.tolist()}
+    )
+    return {**row, "twin": mirrored}
 
 
-def _from_base(simulated: Simulated, number: int) -> dict[str, Any]:
-    """Extremes of the displacements from a base that moves, and its amplitude."""
-    if not simulated.base:
-        return {}
-    spans = simulated.from_base
-    span = spans[number] if spans else (simulated.orbit, *simulated.others)[number].extremes
-    z = span[0::2] if len(span) else None
-    low, high = (None, None) if z is None else (z[:, 0], z[:, 1])
-    return {"from_base_max": high, "from_base_min": low, "base_amplitude": simulated.base}
+def _reach(span: Array | None) -> tuple[list[float], list[float]] | tuple[None, None]:
+    """Greatest and least displacement of each mass; None where they are not known.
+
+    span : (states, 2) least and greatest, or (0, 2).
+    """
+    if span is None or not len(span):
+        return None, None
+    return span[0::2, 1].tolist(), span[0::2, 0].tolist()
 
 
-def _in_clearances(
-    simulated: Simulated, orbit: Orbit, si: SiScales | None = None
-) -> dict[str, Any]:
+def _in_clearances(simulated: Simulated, orbit: Orbit, si: SiScales | None) -> list[ClearanceReach]:
     """How far an orbit goes in each clearance and into its stops, and how fast it meets them; with
-    ``si`` also that in SI units. Nothing of a model without clearances."""
-    rows: list[dict[str, Any]] = []
-    scales = {"": (1.0, "", 1.0, "")}
-    if si is not None:
-        scales["SI"] = (si.length_scale, "_m", si.speed_scale, "_m_s")
-    for k, (name, motion) in enumerate(zip(simulated.clearances, simulated.motions, strict=False)):
+    ``si`` also that in SI units."""
+    rows = []
+    for k, (name, motion) in enumerate(zip(simulated.clearances, simulated.motions, strict=True)):
         low, high = orbit.spans[k] if len(orbit.spans) else (math.nan, math.nan)
         speeds = orbit.speeds[k] if len(orbit.speeds) else (math.nan, math.nan)
-        row: dict[str, Any] = {"clearance": name, "upper": None, "lower": None}
-        for length, unit, speed, rate in scales.values():
-            row |= {f"max{unit}": length * high, f"min{unit}": length * low}
-            for side, place in motion.stops:
-                end, met = (high, speeds[1]) if side > 0 else (low, speeds[0])
-                key = "upper" if side > 0 else "lower"
-                depth = {f"depth{unit}": length * side * (end - place)}
-                row[key] = {**(row[key] or {}), **depth, f"speed{rate}": speed * met}
+        row: ClearanceReach = {
+            "clearance": name,
+            "upper": None,
+            "lower": None,
+            "max": high,
+            "min": low,
+        }
+        if si is not None:
+            row["max_m"], row["min_m"] = si.length_scale * high, si.length_scale * low
+        for side, place in motion.stops:
+            end, speed = (high, speeds[1]) if side > 0 else (low, speeds[0])
+            depth = side * (end - place)
+            stop: StopReach = {"depth": depth, "speed": speed}
+            if si is not None:
+                stop["depth_m"], stop["speed_m_s"] = si.length_scale * depth, si.speed_scale * speed
+            if side > 0:
+                row["upper"] = stop
+            else:
+                row["lower"] = stop
         rows.append(row)
-    return {"in_clearances": rows} if rows else {}
-
-
-def _sticking(simulated: Simulated, number: int) -> dict[str, Any]:
-    """What each friction does over an orbit, null where that is not known; nothing without any."""
-    held = simulated.sticking[number] if simulated.sticking else ()
-    if held is None:
-        return {"sticking": None}
-    return {"sticking": held} if held else {}
+    return rows
 
 
 def _by_state(values: Array) -> dict[str, Any]:
     """Rows of a (states, …) array by the states' names."""
     from designer.model.mechanics import state_names
 
-    return dict(zip(state_names(len(values) // 2), values, strict=True))
+    return dict(zip(state_names(len(values) // 2), values.tolist(), strict=True))
 
 
-def _frequencies_hz(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:
-    """The two frequencies of a quasi-periodic motion in Hz; nothing of any other motion, nor of a
-    dimensionless model."""
-    if si is None or not orbit.frequencies:
-        return {}
-    return {"frequencies_hz": [si.hertz(omega) for omega in orbit.frequencies]}
-
-
-def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
+def orbit_json(orbit: Orbit, si: SiScales | None = None) -> OrbitRow:
     """An orbit in model units; with ``si`` also its extremes and impacts in SI units. frequencies :
     of a quasi-periodic motion the drive's ω and the second one."""
-
     is_known = len(orbit.extremes) > 0
     impacts = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
-    return {
+    more: OrbitExtras = {"more": orbit.more} if orbit.more else {}
+    row: OrbitRow = {
         "response": orbit.response,
         "status": str(orbit.status),
         "n": orbit.n,
         "p": orbit.p,
         "q": orbit.q,
-        **({"more": orbit.more} if orbit.more else {}),
-        "start": orbit.start,
+        **more,
+        "start": orbit.start.tolist(),
         "symmetric": orbit.symmetric,
         "asymmetry": orbit.asymmetry,
         "x1_max": orbit.extremes[0, 1] if is_known else None,
         "x1_min": orbit.extremes[0, 0] if is_known else None,
         "extremes": _by_state(orbit.extremes) if is_known else None,
-        "impact_velocities": orbit.impact_velocities,
+        "impact_velocities": orbit.impact_velocities.tolist(),
         "impacts": [
             {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
             for t, side, v in impacts
         ],
-        "multipliers": list(orbit.multipliers.astype(complex)),
+        "multipliers": [[m.real, m.imag] for m in orbit.multipliers.astype(complex).tolist()],
         "lyapunov": orbit.lyapunov,
         "lyapunov_error": orbit.lyapunov_error,
         "frequencies": list(orbit.frequencies) or None,
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
-        **_orbit_si(orbit, si),
     }
-
-
-def _orbit_si(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:
-    if si is None:
-        return {}
-    is_known = len(orbit.extremes) > 0
-    low, high = orbit.extremes[0] * si.length_scale if is_known else (None, None)
-    return {
-        "x1_max_m": high,
-        "x1_min_m": low,
-        "impact_velocities_m_s": orbit.impact_velocities * si.speed_scale,
-    }
-
-
-def _twin_json(twin: Orbit | None) -> dict[str, Any] | None:
-    """A mirror twin: what it is called and where it starts; the rest follows by the mirror."""
-    return None if twin is None else {"response": twin.response, "start": twin.start}
+    if si is not None:
+        low, high = orbit.extremes[0] * si.length_scale if is_known else (None, None)
+        row["x1_max_m"], row["x1_min_m"] = high, low
+        row["impact_velocities_m_s"] = (orbit.impact_velocities * si.speed_scale).tolist()
+    return row
 
 
 def _conditions(design: Design) -> dict[str, Any]:
@@ -316,7 +325,7 @@ def _limit(circuit: Circuit) -> float:
     return circuit.output_limits().get(switches[0], circuit.saturation)
 
 
-def _dead_zone(design: Design) -> dict[str, Any] | None:
+def _dead_zone(design: Design) -> DeadZoneRow | None:
     if not design.circuit.dead_zones:
         return None
     errors = design.errors

@@ -5,11 +5,14 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.errors import EnvironmentMissing
 from designer.base.version import __version__
 from designer.model.model_file import ModelFile
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import ProvenanceRow
 
 LIBRARIES = {
     "numpy": "numpy",
@@ -35,7 +38,7 @@ def provenance(
     seed: int | None = None,
     settings: Mapping[str, Any] | None = None,
     spread: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
+) -> ProvenanceRow:
     """The object ``provenance`` of a JSON file.
 
     seed : None where no random number enters. settings : of the solvers that were used.

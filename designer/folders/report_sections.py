@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from designer.base.design_folder import DESIGN, REPORTS, Folder
 from designer.base.errors import InputError
@@ -38,7 +39,7 @@ def design_hash(folder: Path) -> str:
 def _bench(folder: Folder) -> Iterator[PageSection]:
     """The boards whose answers lie in directories of the folder, but those of another design."""
     own = design_hash(folder.path)
-    answers = {}
+    answers = dict[str, Any]()
     for path in sorted(folder.path.rglob(BENCHED)):
         with contextlib.suppress(InputError):
             answer = read_json(path)

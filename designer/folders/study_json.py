@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from designer.base.plain_json import FORMAT
+from designer.base.plain_json import FORMAT, plain
 from designer.check.checked_design import CheckedResponse
 from designer.model.model import SiScales
 from designer.model.si_units import hertz_json
@@ -24,19 +23,44 @@ from designer.yields.two_engine_yield import Combined
 from designer.yields.yield_count import Yield, count, count_verdicts, reasons
 from designer.yields.yield_maps import YieldMap
 
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import ProvenanceRow
+    from designer.answers.study_answer import (
+        AgreementCounts,
+        AgreementRow,
+        AnyLostKey,
+        AttributionRow,
+        CensusKey,
+        CombinedRow,
+        MarginRows,
+        QuantileRows,
+        RareLossKeys,
+        RatedCounts,
+        ReachedRow,
+        ResponseExtras,
+        StudyAnswer,
+        StudyCost,
+        StudyMapRow,
+        StudyResponse,
+        TrimmedRow,
+        TunedRow,
+        YieldCounts,
+    )
+
 MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 def study_json(
     study: Study,
-    provenance: Mapping[str, Any],
+    provenance: ProvenanceRow,
     cost: Mapping[str, float],
     equations: EquationCheck | None = None,
     si: SiScales | None = None,
-) -> dict[str, Any]:
+) -> StudyAnswer:
     """What ``tolerance`` prints and ``tolerance.json`` holds; with ``si`` also the
     frequencies in Hz."""
+    any_lost: AnyLostKey = {"any_lost": plain(study.any_lost)} if study.rare else {}
     return {
         "format": FORMAT,
         "samples": study.plan.samples,
@@ -49,7 +73,7 @@ def study_json(
             "trimmed": _yield(study.on_one_board(study.trimmed)),
             "reached": _yield(study.on_one_board(study.power_ups)),
         },
-        **({"any_lost": _any_lost(study)} if study.rare else {}),
+        **any_lost,
         "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [
@@ -58,15 +82,21 @@ def study_json(
         ],
         "maps": [_map(each) for each in study.maps],
         "provenance": provenance,
-        "cost": dict(cost),
+        "cost": cast("StudyCost", dict(cost)),
     }
 
 
-def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, Any]:
+def _response(checked: CheckedResponse, study: Study, index: int) -> StudyResponse:
     model, ngspice = checked.model, checked.ngspice
     answers = study.answers_to(index)
     counted = study.yields[index]
-    row: dict[str, Any] = {
+    exponents: ResponseExtras = {}
+    if checked.exponents:
+        exponents = {
+            "exponents": {k: {"value": v, "error": e} for k, (v, e) in checked.exponents.items()}
+        }
+    rare: ResponseExtras = {"rare": _rare(study, index)} if study.rare else {}
+    row: StudyResponse = {
         "omega": model.omega,
         "expected": model.expected,
         "found": model.found,
@@ -76,7 +106,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "ngspice_reason": "" if ngspice is None else ngspice.reason,
         "engines_agree": checked.agrees,
         "symmetric": model.orbit.symmetric,
-        **({"exponents": _exponents(checked)} if checked.exponents else {}),
+        **exponents,
         "others": [o.response for o in model.others],
         "yield": _yield(counted),
         "rate": None if counted is None else counted.rate,
@@ -88,7 +118,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
         "reached": _reached(study, index),
         "blame": _attribution(study, index),
-        **({"rare": _rare(study, index)} if study.rare else {}),
+        **rare,
         "trust": {
             **{engine: trust.verdict() for engine, trust in checked.trust.items()},
             "yield": None
@@ -101,23 +131,17 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
     return row
 
 
-def _exponents(checked: CheckedResponse) -> dict[str, dict[str, float]]:
-    """The exponent by each engine."""
-    return {
-        engine: {"value": value, "error": error}
-        for engine, (value, error) in checked.exponents.items()
-    }
+def _yield(counted: Yield | None) -> YieldCounts | None:
+    return None if counted is None else _counts(counted)
 
 
-def _yield(counted: Yield | None) -> dict[str, Any] | None:
-    if counted is None:
-        return None
+def _counts(counted: Yield) -> YieldCounts:
     low, high = counted.interval
-    more = {"census": True} if counted.census else {}
+    more: CensusKey = {"census": True} if counted.census else {}
     return {**counted.counts, "low": low, "high": high, **more}
 
 
-def tuned_json(rows: Sequence[Tuned], census: bool = False) -> dict[str, Any] | None:
+def tuned_json(rows: Sequence[Tuned], census: bool = False) -> TunedRow | None:
     """What exists within the bands, and under ``bench`` what the bench procedure finds."""
     if not rows:
         return None
@@ -136,7 +160,7 @@ def tuned_json(rows: Sequence[Tuned], census: bool = False) -> dict[str, Any] | 
     }
 
 
-def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any] | None:
+def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> TrimmedRow | None:
     """What the boards show with their trimmers set; at_end : boards that would turn further."""
     if not rows:
         return None
@@ -147,7 +171,7 @@ def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any
     }
 
 
-def _reached(study: Study, index: int) -> dict[str, Any] | None:
+def _reached(study: Study, index: int) -> ReachedRow | None:
     """What the boards of a response show from power-up by the recipe."""
     rows = study.rows_of(index, study.power_ups)
     if not rows or study.recipes is None:
@@ -160,46 +184,46 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
     }
 
 
-def _attribution(study: Study, index: int) -> dict[str, Any] | None:
+def _attribution(study: Study, index: int) -> AttributionRow | None:
     if study.blame is None or index not in study.response_indices:
         return None
-    attribution: dict[str, Any] = study.blame.as_dict()["responses"][
-        study.response_indices.index(index)
-    ]
-    return attribution
+    return study.blame.as_dict()["responses"][study.response_indices.index(index)]
 
 
-def _rare(study: Study, index: int) -> dict[str, Any] | None:
+def _rare(study: Study, index: int) -> RareLossKeys | None:
     """Without what it cost, which stands with the other costs."""
     found = study.rare_of(index)
-    if found is None:
-        return None
-    return {k: v for k, v in found.as_dict().items() if k not in ("question", "seconds")}
+    return None if found is None else _without(found.as_dict(), "question", "seconds")
 
 
-def _any_lost(study: Study) -> dict[str, float] | None:
-    return None if study.any_lost is None else asdict(study.any_lost)
-
-
-def _map(yields: YieldMap) -> dict[str, Any]:
+def _map(yields: YieldMap) -> StudyMapRow:
     """Without what it cost, which stands with the other costs."""
-    return {key: value for key, value in yields.as_dict().items() if key != "cost"}
+    row: StudyMapRow = _without(yields.as_dict(), "cost")
+    return row
 
 
-def _counted(counted: Yield) -> dict[str, Any]:
-    return {**(_yield(counted) or {}), "rate": counted.rate}
+def _without(row: Mapping[str, Any], *keys: str) -> Any:
+    return {key: value for key, value in row.items() if key not in keys}
 
 
-def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) -> dict[str, Any]:
+def _counted(counted: Yield) -> RatedCounts:
+    return {**_counts(counted), "rate": counted.rate}
+
+
+def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) -> AgreementRow:
     """Boards on which ngspice agrees, by their start: their own orbit, or the nominal one."""
     answer_of = {a.sample: a for a in answers}
 
-    def of(kind: str) -> dict[str, Any]:
+    def of(kind: str) -> AgreementCounts:
         outcomes = [
             h.outcome(answer_of[h.sample]) for h in cross_checks if h.kind == kind and h.response
         ]
-        counted = (NgspiceVerdict.AGREED, NgspiceVerdict.FAILED, NgspiceVerdict.UNDECIDED)
-        return {"asked": len(outcomes), **{str(one): outcomes.count(one) for one in counted}}
+        return {
+            "asked": len(outcomes),
+            "agreed": outcomes.count(NgspiceVerdict.AGREED),
+            "failed": outcomes.count(NgspiceVerdict.FAILED),
+            "undecided": outcomes.count(NgspiceVerdict.UNDECIDED),
+        }
 
     too_long = [h for h in cross_checks if not h.response]
     return {
@@ -212,7 +236,7 @@ def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) ->
     }
 
 
-def _combined(both: Combined | None) -> dict[str, Any] | None:
+def _combined(both: Combined | None) -> CombinedRow | None:
     if both is None:
         return None
     low, high = both.disagreement.interval
@@ -239,20 +263,24 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
             }
             for s in both.strata
         ],
-        "differences": both.differences,
+        "differences": plain(both.differences),
     }
 
 
-def margins(answers: Sequence[Answer]) -> dict[str, Any]:
+def margins(answers: Sequence[Answer]) -> MarginRows:
     """Quantiles of each margin over the boards that are ok and have it; null where none has it.
 
     boards : that are ok, and ``counted`` by margin: not every board has every margin, such as the
     nearest miss without one. penetration, miss : V of the moving state; the others are ratios.
     """
     ok = [a for a in answers if a.verdict is Verdict.OK]
-    out: dict[str, Any] = {"quantiles": list(QUANTILES), "boards": len(ok), "counted": {}}
-    for name in MARGINS:
-        values = [v for a in ok if math.isfinite(v := float(getattr(a, name)))]
-        out[name] = list(np.quantile(values, QUANTILES)) if values else None
-        out["counted"][name] = len(values)
-    return out
+    values = {
+        name: [v for a in ok if math.isfinite(v := float(getattr(a, name)))] for name in MARGINS
+    }
+    quantiles = {n: np.quantile(v, QUANTILES).tolist() if v else None for n, v in values.items()}
+    return {
+        "quantiles": QUANTILES,
+        "boards": len(ok),
+        "counted": {name: len(v) for name, v in values.items()},
+        **cast("QuantileRows", quantiles),
+    }

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import is_design_folder
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
-from designer.base.plain_json import dumps
+from designer.base.plain_json import dumps, plain
 from designer.base.printed import one_line
 from designer.base.progress import Progress
 from designer.circuit.design import GeneratorSetting
@@ -29,6 +29,10 @@ from designer.workbench.overlay import Overlay
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import RecordedMotion
 from designer.workbench.record_formats import read_record
+
+if TYPE_CHECKING:
+    from designer.answers.bench_answer import BenchJson, CutRow, RecordRow, StopRow
+    from designer.workbench.dead_zone_curve import DeadZoneCurve
 
 PAGE, LIST = "bench.html", "boards.csv"
 LISTED = 20
@@ -221,7 +225,7 @@ def near_setting(frequency: float, prediction: BoardPrediction) -> GeneratorSett
     return setting if gap < NEAR else None
 
 
-def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> dict[str, Any]:
+def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> RecordRow:
     """seconds : of the circuit for a unit of the model's time."""
     name, motion = benched.named, benched.named.motion
     record, overlay, setting = motion.record, benched.overlay, benched.setting
@@ -254,17 +258,7 @@ def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> 
         "asymmetry_error": name.asymmetry_error,
         "wanted": None if setting is None else setting.expect,
         "as_wanted": benched.as_wanted,
-        "stops": [
-            {
-                "clearance": clearance,
-                **{
-                    key: {"volts": zone.ends[side], "error": zone.end_errors[side]}
-                    for side, key in ((1, "upper"), (-1, "lower"))
-                    if side in zone.ends
-                },
-            }
-            for clearance, zone in name.dead_zones.items()
-        ],
+        "stops": [_stops(clearance, zone) for clearance, zone in name.dead_zones.items()],
         "exact_circuit": None
         if overlay is None
         else {"response": overlay.orbit.response, "difference": dict(overlay.errors)},
@@ -275,12 +269,21 @@ def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> 
             "fitted": wave.fitted,
             "difference": dict(wave.errors),
         },
-        "fitted": None if benched.board is None else benched.board.figures,
+        "fitted": None if benched.board is None else plain(benched.board.figures),
         "advice": None if benched.advice is None else benched.advice.as_dict(si),
     }
 
 
-def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> dict[str, Any]:
+def _stops(clearance: str, zone: DeadZoneCurve) -> StopRow:
+    row: StopRow = {"clearance": clearance}
+    if 1 in zone.ends:
+        row["upper"] = {"volts": zone.ends[1], "error": zone.end_errors[1]}
+    if -1 in zone.ends:
+        row["lower"] = {"volts": zone.ends[-1], "error": zone.end_errors[-1]}
+    return row
+
+
+def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> CutRow:
     """A channel that is cut off below or above a voltage [V]."""
     ends = [
         f"{side} {end:.3g} V" for side, end in (("below", low), ("above", high)) if end is not None
@@ -295,7 +298,7 @@ def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> 
 def write_answer(
     place: Path,
     names: Sequence[str],
-    answer: Mapping[str, Any],
+    answer: BenchJson,
     records: Sequence[BenchedRecord],
 ) -> None:
     """The answer, its page and the picture of each record."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -78,15 +78,28 @@ from designer.spread.spread import Spread, draw_many
 if TYPE_CHECKING:
     import pandas as pd
 
-
+    from designer.answers.bifurcation_answer import (
+        AxisRow,
+        BasinsBody,
+        BifurcationAnswer,
+        CurveRow,
+        EndsInSi,
+        GridBody,
+        MapBody,
+        PointRow,
+        SiUnitKeys,
+        SweepAnswer,
+        SweepBody,
+        SweepExtras,
+        ValueInSi,
+        WindowRow,
+    )
 Files = dict[str, str | bytes]
 """Contents of files by name."""
+Made: TypeAlias = "tuple[SweepBody | MapBody | BasinsBody, dict[str, Any], Callable[[], Files]]"
+"""What is in the JSON object, what it cost, and what makes the pictures and tables."""
 Kept = TypeVar("Kept")
 PlanOf = TypeVar("PlanOf")
-Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Files]]
-"""What is in the JSON object, what it cost, and what makes the pictures and tables."""
-
-
 Computed = Sweep | ParameterMap | Basins
 """What a plan makes."""
 
@@ -178,12 +191,23 @@ class BifurcationWork:
         return blocks(plan, files)
 
 
-def with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
-    """The row, and the values of the swept quantity in its SI unit too, if it has one."""
+def _value_in_si(value: float | None, unit: Unit | None) -> ValueInSi:
+    """A value of the swept quantity in its SI unit, if it has one."""
+    if unit is None or value is None:
+        return {}
+    return cast("ValueInSi", {f"value_{unit.suffix}": value * unit.scale})
+
+
+def _ends_in_si(low: float, high: float, unit: Unit | None) -> EndsInSi:
+    """The ends of a range likewise."""
     if unit is None:
-        return row
-    keys = [key for key in ("from", "to", "value") if row.get(key) is not None]
-    return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
+        return {}
+    ends = {"from": low, "to": high}.items()
+    return cast("EndsInSi", {f"{key}_{unit.suffix}": end * unit.scale for key, end in ends})
+
+
+def _si_keys(unit: Unit | None) -> SiUnitKeys:
+    return {} if unit is None else {"si_unit": unit.name, "si_scale": unit.scale}
 
 
 def image_files(kind: str, figure: Any) -> Files:
@@ -211,71 +235,82 @@ def _sweep(work: BifurcationWork, plan: SweepPlan) -> Made:
     points = () if found is None else found.points
     si, unit = plan.subject.si.get(name), plan.subject.units.get(name, "")
     symbol = titles.NAMES.get(name, name)
-    body: dict[str, Any] = {
-        "parameter": name,
-        "unit": unit,
-        "from": plan.values.min(),
-        "to": plan.values.max(),
-        **({} if si is None else {"si_unit": si.name, "si_scale": si.scale}),
-        "tracks": list(plan.tracks),
-        "steps": len(plan.values),
-        "windows": _windows(swept, found, si),
-        "points": [
-            {
-                **with_si(p.as_dict(), si),
-                "caption": point_captions.caption(p, symbol, unit),
-                "changes": [c.as_dict() for c in captions.changes(swept, p)],
-            }
-            for p in points
-        ],
-    }
-    if found is not None:
-        missing = (
-            {**with_si(_missing(name, end), si), "caption": captions.missing(end, symbol, unit)}
-            for end in found.missing
-        )
-        body["points"] = sorted([*body["points"], *missing], key=lambda row: float(row["value"]))
-    shares = _shares(work)
+    rows: list[PointRow] = [
+        {
+            **p.as_dict(),
+            **_value_in_si(p.value, si),
+            "caption": point_captions.caption(p, symbol, unit),
+            "changes": [c.as_dict() for c in captions.changes(swept, p)],
+        }
+        for p in points
+    ]
+    for end in () if found is None else found.missing:
+        caption = captions.missing(end, symbol, unit)
+        row = _missing(name, end)
+        rows.append({**row, **_value_in_si(row["value"], si), "caption": caption})
+    rows.sort(key=lambda row: row["value"])
+    windows, shares = _windows(swept, found, si), _shares(work)
+    extras: SweepExtras = {}
     suffix = "" if si is None else si.suffix
-    tables = (windows_csv(body["windows"], suffix), points_csv(body["points"], suffix))
+    tables = (windows_csv(windows, suffix), points_csv(rows, suffix))
     pictures: list[Callable[[], Files]] = [
         lambda: _diagram(work, swept, points, shares),
         lambda: dict(zip(TABLES, tables, strict=True)),
     ]
     if shares is not None:
-        body["shares"] = shares.as_dict()
+        extras["shares"] = shares.as_dict()
         pictures.append(lambda: {"shares.csv": shares_csv(shares)})
     if work.curves is not None:
         curves = _curves(work, work.curves, points)
         second = plan.subject.si.get(work.curves.second)
-        body["and"] = {
-            **with_si({**work.curves.as_dict(), "at": work.curves.at}, second),
+        axis = work.curves.as_dict()
+        extras["and"] = {
+            **axis,
+            "at": work.curves.at,
+            **_ends_in_si(axis["from"], axis["to"], second),
             "unit": plan.subject.units.get(work.curves.second, ""),
-            **({} if second is None else {"si_unit": second.name, "si_scale": second.scale}),
+            **_si_keys(second),
         }
-        body["curves"] = [curve.as_dict() for curve in curves]
+        extras["curves"] = [curve.as_dict() for curve in curves]
         region = _region(work, work.curves, swept)
         if region is not None:
-            body["region"] = region.as_dict()
+            extras["region"] = region.as_dict()
         pictures.append(lambda: _curve_files(work, swept, curves, region))
 
     def files() -> Files:
         return {name: content for each in pictures for name, content in each().items()}
 
+    body: SweepBody = {
+        "parameter": name,
+        "unit": unit,
+        "from": float(plan.values.min()),
+        "to": float(plan.values.max()),
+        **_si_keys(si),
+        "tracks": plan.tracks,
+        "steps": len(plan.values),
+        "windows": windows,
+        "points": rows,
+        **extras,
+    }
     return body, {"periods": swept.periods}, files
 
 
-def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[dict[str, object]]:
+def _windows(swept: Sweep, found: WindowEnds | None, unit: Unit | None) -> list[WindowRow]:
     """The windows of a sweep; where they were looked for, families and ends of periodic ones."""
     out = []
     for number, window in enumerate(swept.windows):
-        row = with_si(window.as_dict(), unit) | misfits_json(_misfits(swept, window))
+        row: WindowRow = {
+            **window.as_dict(),
+            **_ends_in_si(window.low, window.high, unit),
+            **misfits_json(_misfits(swept, window)),
+        }
         ends = None if found is None else found.ends[number]
         if found is not None:
             row["family"] = found.families[number]
         if ends is not None:
-            keys = zip(("from_end", "to_end"), ends, strict=True)
-            row |= {key: with_si(end.as_dict(), unit) for key, end in keys}
+            low, high = ends
+            row["from_end"] = {**low.as_dict(), **_value_in_si(low.value, unit)}
+            row["to_end"] = {**high.as_dict(), **_value_in_si(high.value, unit)}
         out.append(row)
     return out
 
@@ -304,9 +339,10 @@ def _misfits(swept: Sweep, window: Window) -> list[LawMisfit]:
     return list(worst.values())
 
 
-def _missing(parameter: str, end: SweptEnd) -> dict[str, Any]:
+def _missing(parameter: str, end: SweptEnd) -> PointRow:
     """A row among the points, by the keys of a point, for an end that was not located."""
     response, symmetric = end.window.response, end.window.symmetric
+    assert end.value is not None
     return {
         "parameter": parameter,
         "kind": end.kind,
@@ -461,7 +497,7 @@ class PictureData:
 class BifurcationResult:
     """What the verb ``bifurcation`` answers."""
 
-    answer: dict[str, Any] = field(repr=False)
+    answer: BifurcationAnswer = field(repr=False)
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""
@@ -531,42 +567,53 @@ class BifurcationResult:
 
     def windows(self) -> pd.DataFrame:
         """The windows of a sweep, a row each; empty of a map and of basins."""
-        return frame(self.answer.get("windows", ()))
+        return frame(() if self._sweep is None else self._sweep["windows"])
 
     def curves(self) -> pd.DataFrame:
         """The curves over two parameters, a row each; empty where none were asked for."""
-        return frame(self.answer.get("curves", ()))
+        return frame(self._curves)
 
     def curve_points(self) -> pd.DataFrame:
         """The points of these curves, a row each: the curve's number from 1, both parameters, and
         whether the orbit is stable on one side; empty where none were asked for."""
-        names = (self._over, self.answer.get("and", {}).get("name", ""))
+        second = None if self._sweep is None else self._sweep.get("and")
+        names = (self._over, "" if second is None else second["name"])
         return frame(
             {"curve": number, **dict(zip(names, point, strict=True)), "stable": stable}
-            for number, curve in enumerate(self.answer.get("curves", ()), 1)
+            for number, curve in enumerate(self._curves, 1)
             for point, stable in zip(curve["points"], curve["stable"], strict=True)
         )
 
     def shares(self) -> pd.DataFrame:
         """The counted basins of a sweep, a row for each attractor at each value; empty where none
         were asked for."""
-        attractors = self.answer.get("shares", {}).get("attractors", ())
+        counted = None if self._sweep is None else self._sweep.get("shares")
+        attractors = () if counted is None else counted["attractors"]
         return frame([{"attractor": a["number"], **s} for a in attractors for s in a["steps"]])
 
     def points(self) -> pd.DataFrame:
         """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
         columns = "parameter", "kind", "value", "before", "after", "response"
-        return frame(self.answer.get("points", ()), columns)
+        return frame(() if self._sweep is None else self._sweep["points"], columns)
 
     def _repr_html_(self) -> str:
         names = ("from", "to", "response", "symmetric")
-        rows = [{n: w.get(n) for n in names} for w in self.answer.get("windows", ())]
+        windows = () if self._sweep is None else self._sweep["windows"]
+        rows = [{n: w.get(n) for n in names} for w in windows]
         return table_html(f"{self.answer['kind']} over {self._over}", rows)
 
     @property
+    def _sweep(self) -> SweepAnswer | None:
+        return self.answer if self.answer["kind"] == "sweep" else None
+
+    @property
+    def _curves(self) -> Sequence[CurveRow]:
+        return () if self._sweep is None else self._sweep.get("curves", ())
+
+    @property
     def _over(self) -> str:
-        if "parameter" in self.answer:
-            return str(self.answer["parameter"])
+        if self.answer["kind"] == "sweep":
+            return self.answer["parameter"]
         return f"{self.answer['x']['name']} and {self.answer['y']['name']}"
 
 
@@ -658,7 +705,7 @@ def _names(work: BifurcationWork) -> list[str]:
     return [*names, *(f"{work.request.kind}.{ending}" for ending in ("json", "png", "svg"))]
 
 
-def _make(work: BifurcationWork) -> tuple[dict[str, Any], Callable[[], Files]]:
+def _make(work: BifurcationWork) -> tuple[BifurcationAnswer, Callable[[], Files]]:
     """The JSON object, and what makes the pictures and tables."""
     plan = work.plan
     body, cost, draw = _sweep(work, plan) if isinstance(plan, SweepPlan) else _grid(work, plan)
@@ -670,23 +717,30 @@ def _grid(work: BifurcationWork, plan: MapPlan | BasinPlan) -> Made:
     from designer.plots import bifurcation_plots
 
     kind, made = work.request.kind, work.computed()
-    body: dict[str, Any] = {
+    axes: GridBody = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),
         "y": _grid_axis(plan.subject, plan.y, plan.ys),
     }
     if isinstance(made, ParameterMap):
-        body["counts"] = made.counts
         draw = partial(bifurcation_plots.parameter_map, made, work.title)
-        return body, {}, lambda: image_files(kind, draw())
+        counted: MapBody = {**axes, "counts": made.counts}
+        return counted, {}, lambda: image_files(kind, draw())
     assert isinstance(made, Basins)
-    body |= {
+    body: BasinsBody = {
+        **axes,
         "at": made.plan.changes,
-        "attractors": made.attractors,
+        "attractors": plain(made.attractors),
         "cells": [c.attractor for c in made.cells],
     }
     return body, {}, lambda: image_files(kind, bifurcation_plots.basins(made, work.title))
 
 
-def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:
-    axis = {"name": name, "from": values[0], "to": values[-1], "steps": len(values)}
-    return with_si(axis, subject.si.get(name))
+def _grid_axis(subject: Subject, name: str, values: Array) -> AxisRow:
+    low, high = float(values[0]), float(values[-1])
+    return {
+        "name": name,
+        "from": low,
+        "to": high,
+        "steps": len(values),
+        **_ends_in_si(low, high, subject.si.get(name)),
+    }

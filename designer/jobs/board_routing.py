@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import Folder
@@ -22,6 +22,9 @@ from designer.routing.board_copper import layer_count, with_layers
 from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
 
+if TYPE_CHECKING:
+    from designer.answers.export_answer import RoutingRow
+
 
 def board_file(synthesis: Synthesis) -> str:
     """The board's name inside the design folder."""
@@ -34,7 +37,7 @@ def route_in_folder(
     progress: Progress,
     session: Path | None = None,
     count: int | None = None,
-) -> dict[str, Any]:
+) -> RoutingRow:
     """Route what is open on the folder's board; what the answer says of it.
 
     session : of another router, whose tracks and vias come first, in the place of the board's.
@@ -120,7 +123,7 @@ def _replace(path: Path, text: str) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def _answer(name: str, routed: RoutedBoard) -> dict[str, Any]:
+def _answer(name: str, routed: RoutedBoard) -> RoutingRow:
     return {
         "board": name,
         "layers": layer_count(routed.text),

@@ -10,13 +10,14 @@ from collections import ChainMap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import Dialect
 from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
 from designer.base.manifest import ORDERS, DeckStage, OrderStage, StageName, Stages
+from designer.base.plain_json import FORMAT
 from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
@@ -49,6 +50,10 @@ from designer.model.model_file import ModelFile
 from designer.spice import simulator_decks
 from designer.spice.simulator_decks import file_name
 
+if TYPE_CHECKING:
+    from designer.answers.export_answer import ExportExtras, ExportJson
+    from designer.answers.shared_rows import ProvenanceRow
+
 
 @dataclass(frozen=True)
 class OrderRequest:
@@ -67,7 +72,7 @@ class OrderRequest:
 class ExportResult:
     """What the verb ``export`` answers."""
 
-    answer: dict[str, Any]
+    answer: ExportJson
     """The JSON object (docs/contract.md)."""
     folder: Path
     """The design folder."""
@@ -77,7 +82,8 @@ class ExportResult:
     @property
     def passed(self) -> bool:
         """Whether everything was written; False where an order is refused or a net stays open."""
-        return not self.answer.get("refused") and not self.answer.get("routing", {}).get("open")
+        routing = self.answer.get("routing")
+        return not self.answer.get("refused") and (routing is None or not routing["open"])
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -120,7 +126,7 @@ class Export:
         runner, synthesis, reused = self._design()
         self._board(runner, None)
         write_design(runner.folder, synthesis, file, self.options, self.progress)
-        return _result(runner, [], reused, dsn=str(file))
+        return _result(runner, [], reused, {"dsn": str(file)})
 
     def routed(
         self, keep: bool, session: Path | None = None, layers: int | None = None
@@ -142,7 +148,7 @@ class Export:
         routing = route_in_folder(folder, synthesis, self.progress, session, layers)
         listed = {} if folder.manifest is None else folder.manifest.files
         files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
-        return _result(runner, files, reused, routing=routing)
+        return _result(runner, files, reused, {"routing": routing})
 
     def decks(self, dialects: Sequence[Dialect]) -> ExportResult:
         """Write decks."""
@@ -239,7 +245,7 @@ class Export:
 
 def _refused(runner: StageRunner, names: Sequence[str], reasons: Sequence[str]) -> ExportResult:
     """The answer of an order that is not written."""
-    return _result(runner, [], False, fabs=list(names), refused=list(reasons))
+    return _result(runner, [], False, {"fabs": names, "refused": reasons})
 
 
 def _order_texts(order: BoardOrder, fab: Fab, runner: StageRunner) -> dict[str, bytes]:
@@ -258,7 +264,7 @@ def _ordered(runner: StageRunner, names: Sequence[str], reused: bool) -> ExportR
     assert runner.folder.manifest is not None
     folders = tuple(f"{ORDERS}/{name}/" for name in names)
     files = [name for name in runner.folder.manifest.files if name.startswith(folders)]
-    return _result(runner, files, reused, fabs=list(names), refused=[])
+    return _result(runner, files, reused, {"fabs": names, "refused": []})
 
 
 def deck_text(synthesis: Synthesis, dialect: Dialect) -> str:
@@ -280,8 +286,14 @@ def _inputs(runner: StageRunner) -> dict[str, Any]:
 
 
 def _result(
-    runner: StageRunner, files: Sequence[str], reused: bool, **more: object
+    runner: StageRunner, files: Sequence[str], reused: bool, more: ExportExtras | None = None
 ) -> ExportResult:
-    origin = runner.folder.json(DESIGN)["provenance"]
-    answer = {"format": 1, "files": sorted(files), "provenance": origin, **more}
+    origin: ProvenanceRow = runner.folder.json(DESIGN)["provenance"]
+    extras: ExportExtras = {} if more is None else more
+    answer: ExportJson = {
+        "format": FORMAT,
+        "files": sorted(files),
+        "provenance": origin,
+        **extras,
+    }
     return ExportResult(answer, runner.folder.path, reused)

@@ -28,8 +28,8 @@ class JobOutcome:
     What was not computed now is read from the folder when it is asked for.
     """
 
-    answer: dict[str, Any]
-    """The JSON object (docs/contract.md)."""
+    answer: Any
+    """The JSON object (docs/contract.md), as ``answers`` has its type."""
     satisfied: bool
     """Whether the answer is yes."""
     folder: Path | None = None

@@ -44,6 +44,8 @@ from designer.model.model_file import ModelFile, errors_in, need_responses
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.cure_answer import CureAnswer
+
 REPAIR, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
 """How the studies are written: each by its hash, which says all that decides it."""
@@ -59,7 +61,7 @@ RULES = 8
 class CureResult:
     """What a repair answers."""
 
-    answer: dict[str, Any]
+    answer: CureAnswer
     """The JSON object."""
     reached: bool
     """Whether every response has the yield that was asked for, within the budget."""
@@ -183,7 +185,7 @@ def repair_into(
                 "ngspice about the cured design (tolerance --rung ngspice)"
             )
         _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
-    answer = folder.json(REPAIR)
+    answer: CureAnswer = folder.json(REPAIR)
     renew_report(folder, progress.note)
     if out is not None:
         _write_design(base, answer, out, options, progress)
@@ -258,7 +260,7 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
 
 
 def _write_design(
-    base: Synthesis, answer: dict[str, Any], out: Path, options: Options, progress: Progress
+    base: Synthesis, answer: CureAnswer, out: Path, options: Options, progress: Progress
 ) -> None:
     """The repaired design as a design folder; nothing where there is no repair."""
     if not answer["reached"]:

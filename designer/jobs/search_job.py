@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.defaults import SAMPLES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.manifest import Stages
-from designer.base.plain_json import dumps
+from designer.base.plain_json import FORMAT, dumps, plain
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.limiting_parts import limitings
@@ -41,6 +41,14 @@ from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import LocalRunner
 from designer.yields.tolerance_study import check
 
+if TYPE_CHECKING:
+    from designer.answers.search_answer import (
+        ConfirmationFile,
+        ConfirmationRow,
+        ConfirmedRow,
+        SearchKeys,
+    )
+
 CONFIRMATION = "confirmation.json"
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
@@ -67,11 +75,14 @@ def search_into(
     )
     confirmed, stood = _confirmed(final, out, options, progress)
     folder = Folder(out)
-    answer = RANDOM.answer(folder)
-    answer["search"] = {
-        k: v for k, v in folder.json(SEARCH).items() if k not in ("format", "provenance", "cost")
+    search = folder.json(SEARCH)
+    for key in ("format", "provenance", "cost"):
+        search.pop(key, None)
+    answer: SearchKeys = {
+        **RANDOM.answer(folder),
+        "search": search,
+        "confirmation": confirmed,
     }
-    answer["confirmation"] = confirmed
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
     satisfied = study.satisfied and all_confirmed(confirmed)
@@ -94,7 +105,7 @@ def need_ngspice(folder: Folder, options: Options) -> None:
 
 def confirmed_repair(
     out: Path, options: Options, progress: Progress
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[ConfirmationRow, bool]:
     """How ngspice judges boards of the repaired design in the folder ``out``, as drawn, and what
     limits each response; whether the folder held that already. The boards are of no study of the
     folder, which has none yet."""
@@ -102,12 +113,12 @@ def confirmed_repair(
     return _confirmed(modelfile, out, replace(options, samples=SAMPLES), progress, studied=False)
 
 
-def all_confirmed(confirmation: Mapping[str, Any]) -> bool:
+def all_confirmed(confirmation: ConfirmationRow) -> bool:
     """Whether ngspice confirms every response."""
     return all(confirms(row) for row in confirmation["responses"])
 
 
-def confirms(row: Mapping[str, Any]) -> bool:
+def confirms(row: ConfirmedRow) -> bool:
     """Whether ngspice confirms a response: its gate passed, and of the boards that it simulated
     at most the share ``DIFFERING`` differ, are undecided or failed."""
     passed = row["gate"] is not None and row["gate"]["passed"]
@@ -122,7 +133,7 @@ def _confirmed(
     progress: Progress,
     *,
     studied: bool = True,
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[ConfirmationRow, bool]:
     """How ngspice judges boards of the study, and what limits each response; whether the folder
     held that already. studied : whether the folder has that study; its boards are asked here
     otherwise."""
@@ -142,17 +153,21 @@ def _confirmed(
         synthesis, stores = design_files.load(folder, modelfile, catalog), None
         if studied:
             stores = FolderStores(out, folder.watch(), progress.note, vouch=folder.vouches)
-        document = {"format": 1, **_confirm(synthesis, options, progress, stores)}
+        judged = _confirm(synthesis, options, progress, stores)
         with folder.working(stages, provenance(modelfile, catalog.hash, seed=options.seed)):
-            cost = {"seconds": time.perf_counter() - began}
-            folder.write(CONFIRMATION, dumps({**document, "cost": cost}))
-    answer = folder.json(CONFIRMATION)
-    return {k: v for k, v in answer.items() if k not in ("format", "cost")}, not todo
+            document: ConfirmationFile = {
+                "format": FORMAT,
+                **judged,
+                "cost": {"seconds": time.perf_counter() - began},
+            }
+            folder.write(CONFIRMATION, dumps(document))
+    answer: ConfirmationFile = folder.json(CONFIRMATION)
+    return {"rung": answer["rung"], "responses": answer["responses"]}, not todo
 
 
 def _confirm(
     synthesis: Synthesis, options: Options, progress: Progress, stores: FolderStores | None
-) -> dict[str, Any]:
+) -> ConfirmationRow:
     jobs = options.workers
     decides: StudyEngine = "bandwidth" if options.rung == "bandwidth" else "exact"
     study = study_of(
@@ -176,7 +191,7 @@ def _confirm(
     answers = {(a.sample, a.question): a for a in study.answers}
     rows = confirmation_json(cross_checks, answers, study.response_indices, len(study.checked))
     for index, limit, gate in zip(study.response_indices, limits, gates, strict=True):
-        rows[index]["limited_by"] = limit
+        rows[index]["limited_by"] = plain(limit)
         rows[index]["gate"] = gate.as_dict()
     return {"rung": FIDELITY, "responses": rows}
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import ASKED, DESIGN_FILES, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST
-from designer.base.plain_json import dumps
+from designer.base.plain_json import FORMAT, dumps
 from designer.base.progress import Progress
 from designer.base.second_process import other_process
 from designer.base.version import __version__
@@ -36,6 +36,10 @@ from designer.jobs.study_stage import SPICE_TIMEOUT
 from designer.model.model_file import ModelFile
 from designer.spice.batch_backend import program_version
 from designer.spice.pool import SpicePool
+
+if TYPE_CHECKING:
+    from designer.answers.search_answer import SearchFile
+    from designer.answers.shared_rows import Seconds
 
 CANDIDATES = "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
@@ -108,8 +112,14 @@ def searched_into(
         write_design(folder, synthesis, stages, options, progress, other)
     if trade is not None:
         trade = {**trade, "model": final.sha256}
-    cost = {"seconds": time.perf_counter() - began}
-    document = {**search_json(searched), "trade": trade, "provenance": origin, "cost": cost}
+    cost: Seconds = {"seconds": time.perf_counter() - began}
+    document: SearchFile = {
+        "format": FORMAT,
+        **search_json(searched),
+        "trade": trade,
+        "provenance": origin,
+        "cost": cost,
+    }
     folder.write(SEARCH, dumps(document))
     folder.finish("search")
     return model_file(out / MODEL)

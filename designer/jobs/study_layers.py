@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from designer.base.attribution_noise import lacks_noise
+from designer.answers.attribution_noise import lacks_noise
 from designer.base.defaults import OVERS
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.manifest import StageName

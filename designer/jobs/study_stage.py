@@ -45,6 +45,8 @@ from designer.yields.study_identity import RULES, checks_hash
 from designer.yields.tolerance_study import Stores, check, tolerance
 
 if TYPE_CHECKING:
+    from designer.answers.shared_rows import TrustVerdict
+    from designer.answers.study_answer import RunAnswer, StudyAnswer
     from designer.report.data import ReportData
 
 SPICE_TIMEOUT = 900.0
@@ -70,7 +72,7 @@ class Place:
         files = [f"{self.prefix}{name}" for name in study_files(options, responses, census)]
         return {self.stage: ({**inputs, "layers": layers_of(options)}, files)}
 
-    def answer(self, folder: Folder) -> dict[str, Any]:
+    def answer(self, folder: Folder) -> RunAnswer:
         """The answer that stands there."""
         return run_json(design_answer(folder), folder.json(self.prefix + TOLERANCE))
 
@@ -209,7 +211,7 @@ class StudyStage:
             folder.write(place.prefix + name, content)
         self._write(result)
         assert folder.manifest is not None
-        folder.manifest.provenance = result.provenance
+        folder.manifest.provenance = dict(result.provenance)
         if study.blame_status.stage is not AttributionStage.PART:
             (folder / (place.prefix + PIECES)).unlink(missing_ok=True)
         folder.finish(place.stage, stores.names)
@@ -220,10 +222,10 @@ class StudyStage:
         folder, prefix = self.folder, self.place.prefix
         document = result_json(result)
         folder.write(prefix + TOLERANCE, dumps(document))
-        if document["boards"] is not None:
+        if (boards := document["boards"]) is not None:
             wanted = [(c.model.omega, c.model.expected) for c in result.checked]
             labels = measured_table.response_labels(wanted)
-            folder.write(prefix + BOARDS, measured_table.boards_csv(labels, document["boards"]))
+            folder.write(prefix + BOARDS, measured_table.boards_csv(labels, boards))
         self.progress.stage("report")
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
@@ -365,7 +367,7 @@ def run_result(
     )
 
 
-def result_json(result: RunResult) -> dict[str, Any]:
+def result_json(result: RunResult) -> StudyAnswer:
     """What ``tolerance.json`` holds."""
     return study_json.study_json(
         result.study,
@@ -376,17 +378,22 @@ def result_json(result: RunResult) -> dict[str, Any]:
     )
 
 
-def satisfied(answer: Mapping[str, Any]) -> bool:
+def satisfied(answer: RunAnswer) -> bool:
     """Whether every response was found, the engines agree and can be trusted, and the netlist
     computes the model's equation."""
-    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
+    equations = answer["equation_check"]
+    right = equations is None or equations["passed"]
     return right and all(
         r["found"] and r["engines_agree"] and _trusted(r.get("trust", {}))
         for r in answer["responses"]
     )
 
 
-def _trusted(trust: Mapping[str, Any]) -> bool:
+def _trusted(trust: Mapping[str, TrustVerdict | None]) -> bool:
     """Whether the engines' answers can be trusted, where each has one (null: it has none); a yield
     says only how far it is known. Older folders say nothing."""
-    return all(engine["trusted"] is True for name, engine in trust.items() if name != "yield")
+    return all(
+        verdict is not None and verdict["trusted"] is True
+        for name, verdict in trust.items()
+        if name != "yield"
+    )

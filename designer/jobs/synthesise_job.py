@@ -6,10 +6,9 @@ Nothing in this package prints; the command line does.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
@@ -31,6 +30,9 @@ from designer.report.comparison import (
     file_json,
     in_answer,
 )
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import ComparisonFile, DesignAnswer, DesignCost
 
 
 def synthesise_into(
@@ -68,13 +70,13 @@ def synthesise_in_memory(
     synthesis = stage_choice.synthesise(modelfile, catalog, jobs=jobs)
     better = stage_choice.better_stage(modelfile, synthesis, jobs)
     synthesis = replace(synthesis, better_stage=better)
-    answer = plain(design_files.answer(synthesis))
+    answer: DesignAnswer = plain(design_files.answer(synthesis))
     if compare:
         answer = _with_comparison(answer, plain(_comparison(synthesis, progress)))
     return JobOutcome(answer, _all_shown(answer), made=synthesis)
 
 
-def _comparison(synthesis: Synthesis, progress: Progress) -> dict[str, Any]:
+def _comparison(synthesis: Synthesis, progress: Progress) -> ComparisonFile:
     """The JSON object of ``compare.json``."""
     began = time.perf_counter()
     columns = compare_designs(synthesis, lambda name: _stage(progress, name))
@@ -83,7 +85,7 @@ def _comparison(synthesis: Synthesis, progress: Progress) -> dict[str, Any]:
     return file_json(comparison_json(columns), synthesis.modelfile.title, provenance, seconds)
 
 
-def _draw(folder: Folder, document: Mapping[str, Any]) -> None:
+def _draw(folder: Folder, document: ComparisonFile) -> None:
     """The pictures of a comparison."""
     from designer.base import figure_style  # matplotlib is not needed before this
     from designer.report import compare_plots
@@ -94,16 +96,17 @@ def _draw(folder: Folder, document: Mapping[str, Any]) -> None:
     folder.write(png, figure_style.to_png(figure))
 
 
-def _with_comparison(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:
+def _with_comparison(design: DesignAnswer, file: ComparisonFile) -> DesignAnswer:
     """What ``synthesise --compare`` prints: the design's object, and the comparison in it.
 
     The time is None where the file has none: no hash guards the object ``cost``.
     """
-    cost = {**cost_of(design), "comparison_seconds": cost_of(file).get("seconds")}
+    cost: DesignCost = cost_of(design)
+    cost["comparison_seconds"] = cost_of(file).get("seconds")
     return {**design, "comparison": in_answer(file), "cost": cost}
 
 
-def _all_shown(answer: Mapping[str, Any]) -> bool:
+def _all_shown(answer: DesignAnswer) -> bool:
     return all(knob["found"] for knob in answer["knobs"])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
@@ -30,6 +30,9 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, need_responses
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.verdicts.verdict import StudyPlan
+
+if TYPE_CHECKING:
+    from designer.answers.trade_answer import TradeAnswer
 
 SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
@@ -142,7 +145,7 @@ def answer(
     options: Options,
     extent: TradeExtent,
     progress: Progress,
-) -> tuple[dict[str, Any], bool]:
+) -> tuple[TradeAnswer, bool]:
     """The JSON object, and whether the folder held it already; ``out`` None writes nothing."""
     options.check()
     need_responses(modelfile)
@@ -184,7 +187,7 @@ def _document(
     pieces: TradePieces,
     options: Options,
     progress: Progress,
-) -> dict[str, Any]:
+) -> TradeAnswer:
     from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
 
     measured = measure(
@@ -200,7 +203,7 @@ def _document(
     return trade_json(measured, origin, pieces.seconds, file.title, file.si)
 
 
-def _write(folder: Folder, document: dict[str, Any]) -> None:
+def _write(folder: Folder, document: TradeAnswer) -> None:
     from designer.base import figure_style
     from designer.fidelity import trade_files
 

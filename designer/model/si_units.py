@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
 
 from designer.base.errors import InputError
 from designer.base.si_unit import Unit, value_text
 from designer.base.units import ACCELERATIONS, has_unit, parse_angle, parse_quantity
 from designer.model.mechanics import MechanicalModel, state_names
 from designer.model.model import SiScales
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import BasePerVolt, ForceFrequency, MechanismFrequency
 
 MECHANICAL_UNITS = {
     "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
@@ -41,21 +45,21 @@ def in_si(si: SiScales | None, model: MechanicalModel) -> bool:
     return si == SiScales() and "b" not in model.units
 
 
-def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
+def hertz_json(omega: float, si: SiScales | None) -> ForceFrequency:
     """The frequency of a mechanism's force in Hz; nothing of a model without SI values."""
     return {} if si is None else {"frequency_hz": si.hertz(omega)}
 
 
-def mechanism_json(omega: float, si: SiScales | None) -> dict[str, float]:
+def mechanism_json(omega: float, si: SiScales | None) -> MechanismFrequency:
     """What a generator's frequency stands for in the mechanism, Hz; nothing of a model without SI
     values."""
     return {} if si is None else {"mechanism_hz": si.hertz(omega)}
 
 
-BASE = "base_m_s2_per_v"
+BASE: Final = "base_m_s2_per_v"
 
 
-def base_json(per_volt: tuple[int, float] | None, si: SiScales | None) -> dict[str, float]:
+def base_json(per_volt: tuple[int, float] | None, si: SiScales | None) -> BasePerVolt:
     """The acceleration of a moving base per generator volt, m/s²; nothing of a model without SI
     values or without one. per_volt : channel, and the same in model units."""
     if si is None or per_volt is None:

@@ -15,7 +15,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -56,6 +56,9 @@ from designer.paper.report_files import README, write_files
 from designer.paper.statements import gaps, main_cascades, main_windows, statements, symmetric_mains
 from designer.plots import bifurcation_plots, curve_plots
 from designer.plots.point_captions import caption
+
+if TYPE_CHECKING:
+    from designer.answers.shared_rows import ProvenanceRow
 
 OMEGA = (0.15, 1.8)
 """The range of ω in which borders are followed."""
@@ -193,7 +196,7 @@ def reproduce(
     return dynamics
 
 
-def _provenance(extent: DynamicsExtent) -> dict[str, Any]:
+def _provenance(extent: DynamicsExtent) -> ProvenanceRow:
     text = "format = 1\n[model]\n" + "".join(
         f"{name} = {json.dumps(value)}\n" for name, value in MODEL.__dict__.items()
     )

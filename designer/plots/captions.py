@@ -7,6 +7,7 @@ there: a track that changes beside it for another reason has nothing to do with 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion
 from designer.plots.point_captions import caption, doubled, label
+
+if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import ChangeRow
 
 LAG = 2
 """Steps past a point within which its change has to show: motion near one settles slowly."""
@@ -38,7 +42,7 @@ class TrackChange:
     text: str
     """What the track shows before and after the point, for people."""
 
-    def as_dict(self) -> dict[str, str | None]:
+    def as_dict(self) -> ChangeRow:
         """Plain, for JSON."""
         return {"track": self.track, "from": self.before, "to": self.after, "text": self.text}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,9 @@ from matplotlib.ticker import NullLocator
 from designer.base.figure_style import INK, name_rows, new_figure, plain_numbers, say, styled
 from designer.circuit.coefficients import EXACT
 from designer.report.compare_table import peaks
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import ComparedColumn, LoadRow
 
 MARKS = (
     ("#d55e00", "s"),
@@ -26,7 +29,7 @@ OFFSETS = {"typical": "typical offsets", "maximum": "largest offsets"}
 
 
 @styled
-def comparison(columns: Sequence[Mapping[str, Any]]) -> Figure:
+def comparison(columns: Sequence[ComparedColumn]) -> Figure:
     """Three panels that share one legend; ``columns`` as ``comparison_json`` has them.
 
     Left, the size of each coefficient's error in percent on a logarithmic axis; what is exact
@@ -52,7 +55,7 @@ def comparison(columns: Sequence[Mapping[str, Any]]) -> Figure:
 def _errors(
     axes: Axes,
     names: Sequence[str],
-    columns: Sequence[Mapping[str, Any]],
+    columns: Sequence[ComparedColumn],
     marks: Sequence[tuple[str, str]],
 ) -> None:
     axes.set_title("Error of each coefficient: equation, state", loc="left")
@@ -81,7 +84,7 @@ def _errors(
 def _peaks(
     axes: Axes,
     names: Sequence[str],
-    columns: Sequence[Mapping[str, Any]],
+    columns: Sequence[ComparedColumn],
     marks: Sequence[tuple[str, str]],
 ) -> None:
     axes.set_title("Peak output of each op-amp, all wanted responses", loc="left")
@@ -105,7 +108,7 @@ def _peaks(
 
 
 def _offsets(
-    axes: Axes, columns: Sequence[Mapping[str, Any]], marks: Sequence[tuple[str, str]]
+    axes: Axes, columns: Sequence[ComparedColumn], marks: Sequence[tuple[str, str]]
 ) -> None:
     axes.set_title("Shift by the op-amps' offsets over the clearance", loc="left")
     if not any(c["offset"] for c in columns):
@@ -115,8 +118,9 @@ def _offsets(
     axes.axvline(1.0, color=INK, lw=0.9, ls=(0, (4, 2)))
     values = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
-        shifts = c["offset"] or {}
-        row = [np.nan if shifts.get(k) is None else float(shifts[k]) for k in OFFSETS]
+        shifts = c["offset"]
+        ends = (None, None) if shifts is None else (shifts["typical"], shifts["maximum"])
+        row = [np.nan if end is None else end for end in ends]
         values += [v for v in row if v > 0.0]
         _dots(axes, row, i, len(columns), mark)
     axes.set_xscale("log")
@@ -143,5 +147,5 @@ def _dots(
     )
 
 
-def _peak(load: Mapping[str, Any] | None) -> float:
+def _peak(load: LoadRow | None) -> float:
     return float("nan") if load is None else max(abs(load["low"]), abs(load["high"]))

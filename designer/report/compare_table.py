@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from designer.circuit.coefficients import EXACT
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import (
+        ComparedColumn,
+        ComparedResponseRow,
+        Comparison,
+        LargestCurrent,
+        LoadRow,
+    )
 
 NONE = "-"
 
 
-def rows(answer: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def rows(answer: Comparison) -> list[tuple[str, ...]]:
     """Label and one cell for each column of ``comparison_json``; the first row names them."""
-    columns: Sequence[Mapping[str, Any]] = answer["columns"]
+    columns: Sequence[ComparedColumn] = answer["columns"]
     table = [("", *(c["name"] for c in columns))]
     for label, cells in _rows(columns):
         table.append((label, *cells))
     return table
 
 
-def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]]]:
+def _rows(columns: Sequence[ComparedColumn]) -> Iterator[tuple[str, list[str]]]:
     yield "largest error", [_largest(c) for c in columns]
     names = dict.fromkeys(name for c in columns for name in c["errors"] or ())
     for name in names:
@@ -38,11 +47,9 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     for section in dict.fromkeys(name for section_peaks in loads for name in section_peaks):
         yield f"  peak {section}", [_peak(section_peaks.get(section)) for section_peaks in loads]
     yield "largest current", [_current(c["largest_current"]) for c in columns]
-    for kind in ("typical", "maximum"):
-        yield (
-            f"{kind} offset / clearance",
-            [_number((c["offset"] or {}).get(kind)) for c in columns],
-        )
+    offsets = [c["offset"] for c in columns]
+    yield "typical offset / clearance", [_number(o and o["typical"]) for o in offsets]
+    yield "maximum offset / clearance", [_number(o and o["maximum"]) for o in offsets]
     yield "responses kept", [_wanted_count(c["responses"]) for c in columns]
     for i, response in enumerate(columns[0]["responses"]):
         wanted = f" ({response['expected']})" if response["expected"] else ""
@@ -60,13 +67,13 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     yield "price of the rest, at most", [_number(c["price_at_most_eur"], " €") for c in columns]
 
 
-def peaks(column: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+def peaks(column: ComparedColumn) -> dict[str, LoadRow]:
     """The loads of a column by the names that the paper's columns have for its amplifiers."""
     names = column.get("paper_names", {})
     return {names.get(section, section): load for section, load in column["peaks"].items()}
 
 
-def notes(answer: Mapping[str, Any]) -> list[str]:
+def notes(answer: Comparison) -> list[str]:
     """What the columns are, and what could not be computed."""
     out = []
     for c in answer["columns"]:
@@ -75,7 +82,7 @@ def notes(answer: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _largest(column: Mapping[str, Any]) -> str:
+def _largest(column: ComparedColumn) -> str:
     error = column["max_error"]
     return column["reason"] or NONE if error is None else _percent(error).lstrip("+")
 
@@ -90,13 +97,13 @@ def _number(value: float | None, unit: str = "") -> str:
     return NONE if value is None else f"{value:.4g}{unit}"
 
 
-def _peak(load: Mapping[str, Any] | None) -> str:
+def _peak(load: LoadRow | None) -> str:
     return NONE if load is None else f"{max(abs(load['low']), abs(load['high'])):.3g} V"
 
 
-def _current(load: Mapping[str, Any] | None) -> str:
+def _current(load: LargestCurrent | None) -> str:
     return NONE if load is None else f"{1e3 * load['ampere']:.3g} mA, {load['section']}"
 
 
-def _wanted_count(responses: Sequence[Mapping[str, Any]]) -> str:
+def _wanted_count(responses: Sequence[ComparedResponseRow]) -> str:
     return f"{sum(r['kept'] for r in responses)} of {len(responses)}" if responses else NONE

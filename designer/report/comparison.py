@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,6 +41,15 @@ from designer.model.find_responses import ModelResponse, matches
 from designer.model.model import Dimensionless
 from designer.synthesis import output_loads as loads
 from designer.synthesis.output_loads import Load, Loads
+
+if TYPE_CHECKING:
+    from designer.answers.design_answer import (
+        ComparedColumn,
+        Comparison,
+        ComparisonFile,
+        PaperNames,
+    )
+    from designer.answers.shared_rows import ProvenanceRow
 
 OURS = "this design"
 _PROBE = 1e-3
@@ -342,33 +351,42 @@ def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
     )
 
 
-def comparison_json(columns: Sequence[DesignColumn]) -> dict[str, Any]:
+def comparison_json(columns: Sequence[DesignColumn]) -> Comparison:
     """``columns`` in order, and the sources of the printed values where they are one of them."""
     by_net = {s.output: s.name for s in columns[0].candidate.circuit.sections}
-    answer: dict[str, Any] = {
-        "columns": [_column_json(c) | _paper_names(c, by_net) for c in columns]
+    answer: Comparison = {
+        "columns": [{**_column_json(c), **_paper_names(c, by_net)} for c in columns]
     }
     printed = [c for c in columns if c.candidate.name == paper_values.AS_PRINTED]
     if printed:
         names = printed[0].candidate.circuit.values
         answer["printed_in"] = {name: paper_values.SOURCE[name] for name in names}
-    return dict(plain(answer))
+    whole: Comparison = plain(answer)
+    return whole
 
 
 def file_json(
-    answer: Mapping[str, Any], title: str, provenance: Mapping[str, Any], seconds: float
-) -> dict[str, Any]:
+    answer: Comparison, title: str, provenance: ProvenanceRow, seconds: float
+) -> ComparisonFile:
     """What ``compare.json`` holds."""
-    head = {"format": FORMAT, "title": title}
-    return {**head, **answer, "provenance": provenance, "cost": {"seconds": seconds}}
+    return {
+        "format": FORMAT,
+        "title": title,
+        **answer,
+        "provenance": provenance,
+        "cost": {"seconds": seconds},
+    }
 
 
-def in_answer(file: Mapping[str, Any]) -> dict[str, Any]:
+def in_answer(file: ComparisonFile) -> Comparison:
     """The key ``comparison`` of what ``synthesise`` prints, from the object of the file."""
-    return {k: v for k, v in file.items() if k in ("columns", "printed_in")}
+    answer: Comparison = {"columns": file["columns"]}
+    if "printed_in" in file:
+        answer["printed_in"] = file["printed_in"]
+    return answer
 
 
-def _paper_names(column: DesignColumn, by_net: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def _paper_names(column: DesignColumn, by_net: Mapping[str, str]) -> PaperNames:
     """``paper_names``: what the paper calls each section, where its op-amps are no quads.
 
     by_net : names by the net of the output, of a circuit with the paper's op-amps.
@@ -380,7 +398,7 @@ def _paper_names(column: DesignColumn, by_net: Mapping[str, str]) -> dict[str, d
     return {"paper_names": names} if any(new != old for old, new in names.items()) else {}
 
 
-def _column_json(column: DesignColumn) -> dict[str, Any]:
+def _column_json(column: DesignColumn) -> ComparedColumn:
     candidate, errors, bill = column.candidate, column.errors, column.bill
     circuit, current, offset = candidate.circuit, column.current, column.offset
     return {
@@ -411,17 +429,25 @@ def _column_json(column: DesignColumn) -> dict[str, Any]:
             for s in column.settled
         ],
         "peaks": {
-            load.section: {k: v for k, v in load.__dict__.items() if k != "section"}
+            load.section: {
+                "low": load.low,
+                "high": load.high,
+                "current": load.current,
+                "low_in": load.low_in,
+                "high_in": load.high_in,
+                "current_in": load.current_in,
+            }
             for load in column.loads.sections
         },
         "not_run": column.loads.left_out,
-        "largest_current": current
-        and {
+        "largest_current": None
+        if current is None
+        else {
             "ampere": current.current,
             "section": current.section,
             "response": current.current_in,
         },
-        "offset": offset and dict(offset.__dict__),
+        "offset": plain(offset),
         "part_count": bill.parts,
         "packages": bill.packages,
         "distinct_values": bill.distinct,

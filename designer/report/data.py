@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,6 +37,9 @@ from designer.yields.loss_attribution import ResponseAttribution
 from designer.yields.study import RunResult, Study
 from designer.yields.yield_count import Yield
 
+if TYPE_CHECKING:
+    from designer.answers.design_answer import RuleShown
+
 OF_DESIGN = {"drawn", "traces", "stops", "bom", "board_cost", "bench", "board"}
 """What the design and its nominal responses decide, by the names of ``ReportData``."""
 ALL = "all on one board"
@@ -56,7 +60,7 @@ class ReportData:
     """The board as the tool has written it beside the report; None where there is none."""
     warnings: tuple[str, ...] = ()
     """What is not good enough about the design, in sentences."""
-    failed_rules: tuple[Mapping[str, str], ...] = ()
+    failed_rules: tuple[RuleShown, ...] = ()
     """The design rules that fail on its circuit: ``id``, ``found``, ``limit`` and ``do``."""
     folder: str = ""
     """Name of the folder of the design; "" where it is in none."""

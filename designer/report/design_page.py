@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
+from designer.answers.rare_words import boards_at
 from designer.base.page import (
     Block,
     Columns,
@@ -23,7 +24,6 @@ from designer.base.page import (
     table,
     titled,
 )
-from designer.base.rare_words import boards_at
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
@@ -179,7 +179,7 @@ def _purpose(data: ReportData) -> str:
 def _not_good_enough(data: ReportData) -> PageSection:
     """What stands before everything else, where there is something."""
     heads = ("rule", "found", "limit", "what to do")
-    rows = ([rule[key] for key in ("id", "found", "limit", "do")] for rule in data.failed_rules)
+    rows = ([r["id"], r["found"], r["limit"], r["do"]] for r in data.failed_rules)
     failing = table(heads, rows)
     names = ", ".join(rule["id"] for rule in data.failed_rules)
     rules = PageSection("Design rules that fail", [failing], "", "", f"{names}.")

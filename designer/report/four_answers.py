@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
+from designer.answers.rare_words import any_lost_words, loss_words
 from designer.base.page import (
     Bar,
     Bars,
@@ -22,7 +23,7 @@ from designer.base.page import (
     Remedies,
     SmallPrint,
 )
-from designer.base.rare_words import any_lost_words, loss_words
+from designer.base.plain_json import plain
 from designer.base.si_unit import value_text
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.coefficients import EXACT
@@ -312,7 +313,7 @@ def _yields(data: ReportData) -> list[Block]:
         name = words.name(data.checked[data.study.response_indices[most.question]])
         out.append(f"{name}: {loss_words(most.as_dict())}.")
         if data.study.any_lost is not None:
-            out.append(f"{any_lost_words(asdict(data.study.any_lost))}.")
+            out.append(f"{any_lost_words(plain(data.study.any_lost))}.")
     failed = sum(y.failed for _, y in rows)
     if failed:
         out.append(f"{words.plural(failed, 'run')} gave no answer, which the yields leave out.")

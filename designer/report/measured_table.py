@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
 from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields.yield_count import worst
 
 if TYPE_CHECKING:
+    from designer.answers.study_answer import MeasuredBoard
     from designer.yields.study import Study
 
 
-def rows(study: Study) -> list[dict[str, Any]] | None:
+def rows(study: Study) -> list[MeasuredBoard] | None:
     """One object for each board, in the order of the list; None where the study is not of all the
     boards of one.
 
@@ -26,11 +27,11 @@ def rows(study: Study) -> list[dict[str, Any]] | None:
     return table(study.plan, [study.answers_to(i) for i in range(len(study.checked))])
 
 
-def table(plan: StudyPlan, answers: Sequence[Sequence[Answer]]) -> list[dict[str, Any]]:
+def table(plan: StudyPlan, answers: Sequence[Sequence[Answer]]) -> list[MeasuredBoard]:
     """The rows of ``rows`` from the answers to each response; a response that was left out has
     none."""
     by_sample = [{a.sample: a for a in row} for row in answers]
-    out = []
+    out: list[MeasuredBoard] = []
     for sample, label in enumerate(plan.labels):
         one = [row.get(sample) for row in by_sample]
         out.append(
@@ -54,7 +55,7 @@ def cell(answer: Answer) -> str:
     return f"{answer.verdict} ({answer.reason or answer.response})"
 
 
-def boards_csv(labels: Sequence[str], boards: Sequence[Mapping[str, Any]]) -> str:
+def boards_csv(labels: Sequence[str], boards: Sequence[MeasuredBoard]) -> str:
     """``boards.csv``: a row for each board, a column for each response. labels : of these."""
     columns = ("board", *labels, "all")
     cells = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -15,10 +15,21 @@ from designer.base.units import format_quantity
 from designer.report.inline_svg import InlineSvg
 from designer.report.page_html import render_page
 
+if TYPE_CHECKING:
+    from designer.answers.bench_answer import (
+        AdviceRow,
+        BenchJson,
+        BoardRecord,
+        KindSpreadRow,
+        NgspiceOverlay,
+        RecordKeys,
+        RecordRow,
+    )
+
 YES_NO = {True: "yes", False: "no", None: ""}
 
 
-def record_page_html(answer: Mapping[str, Any], figures: Sequence[Figure]) -> str:
+def record_page_html(answer: BenchJson, figures: Sequence[Figure]) -> str:
     """``bench.html`` as text. answer : of ``bench``. figures : of each record."""
     inline = InlineSvg()
     drawings = [
@@ -28,7 +39,7 @@ def record_page_html(answer: Mapping[str, Any], figures: Sequence[Figure]) -> st
     return render_page(record_page(answer, drawings))
 
 
-def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
+def record_page(answer: BenchJson, drawings: Sequence[Markup]) -> Page:
     """The page. drawings : the ``<svg>`` element of each record."""
     records = answer["records"]
     intro = (
@@ -43,7 +54,7 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
             "generator": lambda r: drive_words(r),
             "shows": lambda r: shown_words(r),
             "wanted there": lambda r: r["wanted"] or "",
-            "exact circuit": lambda r: (r["exact_circuit"] or {}).get("response", ""),
+            "exact circuit": lambda r: "" if (e := r["exact_circuit"]) is None else e["response"],
             "ngspice": lambda r: ngspice_words(r["ngspice"]),
         },
     )
@@ -57,16 +68,16 @@ def record_page(answer: Mapping[str, Any], drawings: Sequence[Markup]) -> Page:
     return Page(f"On the bench: {answer['title']}", [intro, overview], [*boards, *sections])
 
 
-def at(row: Mapping[str, Any]) -> str:
+def at(row: RecordKeys | AdviceRow) -> str:
     """The drive frequency of a record, in the model's own units."""
     return drive_text(row["omega"], row.get("mechanism_hz"))
 
 
-def _board_title(board: Mapping[str, Any]) -> str:
+def _board_title(board: BoardRecord) -> str:
     return f"Board {board['board']}" if board["board"] else "The board"
 
 
-def _board(board: Mapping[str, Any]) -> Iterator[Block]:
+def _board(board: BoardRecord) -> Iterator[Block]:
     """What the records tell of a board, and what to turn on it."""
     if board["reason"]:
         yield f"It was not found: {board['reason']}."
@@ -92,7 +103,7 @@ def _board(board: Mapping[str, Any]) -> Iterator[Block]:
     yield PageSection("What to turn", [_advice_table(board["advice"])])
 
 
-def _advice_table(advice: Sequence[Mapping[str, Any]]) -> Table | None:
+def _advice_table(advice: Sequence[AdviceRow]) -> Table | None:
     return table_of(
         advice,
         {
@@ -110,12 +121,12 @@ def _shares(shown: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {share:.0%}" for name, share in shown.items())
 
 
-def _generator(advice: Mapping[str, Any]) -> str:
+def _generator(advice: AdviceRow) -> str:
     volts = f"{advice['amplitude_v_peak']:.4g} V peak, {1e3 * advice['offset_v']:.3g} mV DC"
     return f"{advice['frequency_hz']:.5g} Hz, {volts}"
 
 
-def _spread(kinds: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
+def _spread(kinds: Sequence[KindSpreadRow]) -> Iterator[Block]:
     yield "Standard deviation on these boards over that of the spread in the model file."
     yield table_of(
         kinds,
@@ -127,7 +138,7 @@ def _spread(kinds: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
     )
 
 
-def shown_words(record: Mapping[str, Any]) -> str:
+def shown_words(record: RecordKeys) -> str:
     """What a record shows, with what else it may be."""
     if record["sure"]:
         return str(record["response"])
@@ -135,20 +146,20 @@ def shown_words(record: Mapping[str, Any]) -> str:
     return f"{others}: not sure"
 
 
-def ngspice_words(answer: Mapping[str, Any] | None) -> str:
+def ngspice_words(answer: NgspiceOverlay | None) -> str:
     """What a board shows in ngspice, and which board; "" where it was not run."""
     if answer is None:
         return ""
     return f"{answer['response']} ({'fitted board' if answer['fitted'] else 'nominal'})"
 
 
-def drive_words(record: Mapping[str, Any]) -> str:
+def drive_words(record: RecordRow) -> str:
     """The drive of a record: frequency, and amplitude where it was recorded."""
     volts, hertz = record["amplitude_v_peak"], f"{record['frequency_hz']:.5g} Hz"
     return hertz if volts is None else f"{hertz}, {volts:.3g} V peak"
 
 
-def _blocks(record: Mapping[str, Any], drawing: Markup) -> Iterator[str | Picture | SmallPrint]:
+def _blocks(record: RecordRow, drawing: Markup) -> Iterator[str | Picture | SmallPrint]:
     channels = ", ".join(f"{net} at {channel}" for net, channel in record["channels"].items())
     yield (
         f"{record['kind'] or 'A record'}, {record['samples']} samples over {record['periods']:.3g} "
@@ -160,17 +171,17 @@ def _blocks(record: Mapping[str, Any], drawing: Markup) -> Iterator[str | Pictur
         yield f"Why it is not sure: {record['reason']}. What would tell: {record['would_tell']}."
     for stop in record["stops"]:
         ends = [
-            f"{side} {format_quantity(stop[side]['volts'], 'V')} "
-            f"± {format_quantity(2.0 * stop[side]['error'], 'V')}"
-            for side in ("upper", "lower")
-            if side in stop
+            f"{side} {format_quantity(end['volts'], 'V')} "
+            f"± {format_quantity(2.0 * end['error'], 'V')}"
+            for side, end in (("upper", stop.get("upper")), ("lower", stop.get("lower")))
+            if end is not None
         ]
         yield f"The board's own stops in clearance {stop['clearance']}: {', '.join(ends)}."
-    if record["asymmetry"] is not None:
+    asymmetry, noise = record["asymmetry"], record["asymmetry_error"]
+    if asymmetry is not None and noise is not None:
         symmetric = {True: "symmetric", False: "not symmetric", None: "within the noise"}
         yield (
-            f"Asymmetry {100.0 * record['asymmetry']:.2g} % of the peak "
-            f"(noise {100.0 * record['asymmetry_error']:.2g} %): "
+            f"Asymmetry {100.0 * asymmetry:.2g} % of the peak (noise {100.0 * noise:.2g} %): "
             f"{symmetric[record['symmetric']]}."
         )
     caption = "Blue: the record, all laps on one another. Dashed: the exact circuit, nominal."

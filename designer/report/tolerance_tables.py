@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from designer.answers.rare_words import boards_text, share_text
 from designer.base.page import Table, table, table_of
-from designer.base.rare_words import boards_text, share_text
 from designer.base.si_unit import celsius_text, value_text
 from designer.model.model import SiScales
 from designer.report import words

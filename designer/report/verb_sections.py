@@ -9,6 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
+from designer.answers.bench_answer import BenchShown, RecordShown
+from designer.answers.cure_answer import CuredShown, CureShown, MeasuredShown, TrialShown
+from designer.answers.design_answer import RuleShown
+from designer.answers.rules_answer import RuleCounts, RulesShown
+from designer.answers.trade_answer import BoardTradeShown, TradeShown
 from designer.base.page import (
     Block,
     FileLinks,
@@ -25,10 +32,8 @@ from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 from designer.fidelity import trade_files
 from designer.report import record_page, words
 
-Answer = Mapping[str, Any]
 
-
-def repair_section(answer: Answer, files: Sequence[str]) -> PageSection:
+def repair_section(answer: CureShown, files: Sequence[str]) -> PageSection:
     """The cheapest repair. answer : ``cure.json`` (docs/contract.md). files : of it, for links."""
     blocks: list[Block] = [
         _upgrades(answer),
@@ -44,19 +49,19 @@ def repair_section(answer: Answer, files: Sequence[str]) -> PageSection:
     return PageSection("The cheapest cure", blocks, "cure", "", _repair_lead(answer))
 
 
-def _repair_lead(answer: Answer) -> str:
+def _repair_lead(answer: CureShown) -> str:
     wanted, price = f"{100.0 * answer['target']:g} %", f"{answer['price']:.2f} €"
     if answer["reached"]:
         return f"Every response at {wanted} or better for {price}."
     return f"{wanted} is not reached: {answer['why']}. The best that was measured costs {price}."
 
 
-def _upgrades(answer: Answer) -> Items | str:
+def _upgrades(answer: CureShown) -> Items | str:
     return bullets(answer["said"]) if answer["said"] else "Nothing is changed."
 
 
-def _repaired_responses(answer: Answer) -> Block:
-    columns: dict[str, Callable[[Answer], str]] = {
+def _repaired_responses(answer: CureShown) -> Block:
+    columns: dict[str, Callable[[CuredShown], str]] = {
         "response": _response,
         "as it is": lambda r: _share(r["before"]),
         "with the cure": lambda r: _share(r["after"]),
@@ -65,8 +70,8 @@ def _repaired_responses(answer: Answer) -> Block:
     return table_of(answer["responses"], columns)
 
 
-def _front(answer: Answer) -> Block:
-    columns: dict[str, Callable[[Answer], str]] = {
+def _front(answer: CureShown) -> Block:
+    columns: dict[str, Callable[[TrialShown], str]] = {
         "price": lambda t: f"{t['price']:.2f} €",
         "worst response": lambda t: _share(min(t["measured"], key=_worst)),
         "upgrades": lambda t: "; ".join(t["said"]) or "as it is",
@@ -74,31 +79,32 @@ def _front(answer: Answer) -> Block:
     return table_of(answer["front"], columns, ("price",))
 
 
-def _refused(answer: Answer) -> Items:
+def _refused(answer: CureShown) -> Items:
     return bullets(f"{'; '.join(r['upgrades'])}: {r['why']}" for r in answer["refused"])
 
 
-def _response(row: Answer) -> str:
+def _response(row: CuredShown) -> str:
     place = drive_text(row["omega"], row.get("frequency_hz"))
     return place + (f" ({row['expected']})" * bool(row["expected"]))
 
 
-def _worst(measured: Answer) -> tuple[float, float]:
+def _worst(measured: MeasuredShown) -> tuple[float, float]:
     return (measured["rate"] or 0.0, measured["low"])
 
 
-def _share(measured: Answer) -> str:
+def _share(measured: MeasuredShown) -> str:
     """A measured yield with its interval."""
     if measured["rate"] is None:
         return "not shown"
-    rate, low, high = (f"{100.0 * measured[key]:.4g}" for key in ("rate", "low", "high"))
+    shares = measured["rate"], measured["low"], measured["high"]
+    rate, low, high = (f"{100.0 * share:.4g}" for share in shares)
     failed = f", {measured['failed']} failed" if measured["failed"] else ""
     return f"{rate} % ({low} to {high} %){failed}"
 
 
-def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
+def rules_section(answer: RulesShown, files: Sequence[str]) -> PageSection:
     """The design rules. answer : ``rules.json`` (docs/contract.md). files : of it, for links."""
-    by: dict[str, list[Answer]] = {status: [] for status in (FAIL, PASS, NOT_RUN)}
+    by: dict[str, list[RuleShown]] = {status: [] for status in (FAIL, PASS, NOT_RUN)}
     for rule in answer["rules"]:
         by[rule["status"]].append(rule)
     board = answer["board"]
@@ -116,20 +122,20 @@ def rules_section(answer: Answer, files: Sequence[str]) -> PageSection:
     return PageSection("Design rules", blocks, "rules", "", _rules_lead(answer["counts"]))
 
 
-def _rules_lead(counts: Mapping[str, int]) -> str:
+def _rules_lead(counts: RuleCounts) -> str:
     fail = f"{words.plural(counts[FAIL], 'rule')} failed" if counts[FAIL] else "No rule failed"
     rest = f", {counts[NOT_RUN]} not run" if counts[NOT_RUN] else ""
     return f"{fail}; {counts[PASS]} passed{rest}."
 
 
-def trade_section(answer: Answer, files: Sequence[str]) -> PageSection:
+def trade_section(answer: TradeShown, files: Sequence[str]) -> PageSection:
     """Time against error. answer : ``trade.json`` (docs/contract.md). files : of it, for links."""
     blocks: list[Block] = [
         "The cheapest rung and setting that answers each question, for all responses together. "
         "What the error is measured against: board is the nominal circuit with "
-        f"{trade_files.truth_words(answer)} in ngspice at the finest step, equations the exact "
-        "flow of the model, ideal ngspice with ideal op-amps on the same boards.",
-        trade_files.cheapest_table(answer),
+        f"{trade_files.truth_words(answer['truths'])} in ngspice at the finest step, equations the "
+        "exact flow of the model, ideal ngspice with ideal op-amps on the same boards.",
+        trade_files.cheapest_table(answer["cheapest"], responses=len(answer["truths"])),
         SmallPrint(trade_files.UNITS),
         _boards(answer["boards"]),
         FileLinks(tuple(files)),
@@ -138,23 +144,23 @@ def trade_section(answer: Answer, files: Sequence[str]) -> PageSection:
     return PageSection("Time and error of the engines", blocks, "trade", "", line)
 
 
-def _boards(boards: Sequence[Answer]) -> PageSection | None:
+def _boards(boards: Sequence[BoardTradeShown]) -> PageSection | None:
     if not boards:
         return None
     return PageSection("Yields of both engines", trade_files.board_blocks(boards))
 
 
-def bench_section(answers: Mapping[str, Answer]) -> PageSection:
+def bench_section(answers: Mapping[str, BenchShown]) -> PageSection:
     """Boards on the bench. answers : ``bench.json`` of each, by the folder that holds it."""
     rows = [(place, r) for place, answer in answers.items() for r in answer["records"]]
     asked = [r["as_wanted"] for _, r in rows if r["as_wanted"] is not None]
-    columns: dict[str, Callable[[tuple[str, Answer]], str]] = {
+    columns: dict[str, Callable[[tuple[str, RecordShown]], str]] = {
         "board": lambda row: row[0],
         "record": lambda row: row[1]["file"],
         "drive": lambda row: record_page.at(row[1]),
         "shows": lambda row: record_page.shown_words(row[1]),
         "wanted there": lambda row: row[1]["wanted"] or "",
-        "advice": lambda row: (row[1]["advice"] or {}).get("words", ""),
+        "advice": lambda row: "" if (a := row[1]["advice"]) is None else a.get("words", ""),
     }
     blocks: list[Block] = [
         table_of(rows, columns),
@@ -164,45 +170,22 @@ def bench_section(answers: Mapping[str, Answer]) -> PageSection:
     return PageSection("On the bench", blocks, "bench", "", line)
 
 
-_MEASURED = ("rate", "low", "high", "failed")
-NEEDED: Mapping[str, Sequence[str]] = {
-    "cure": (
-        "target", "price", "reached", "why", "said", "refused.upgrades", "refused.why",
-        "responses.omega", "responses.expected", "responses.limit", "front.price", "front.said",
-        *(f"{yield_}.{key}" for key in _MEASURED for yield_ in
-          ("responses.before", "responses.after", "front.measured")),
-    ),
-    "rules": (
-        "board", *(f"counts.{status}" for status in (FAIL, PASS, NOT_RUN)),
-        *(f"rules.{key}" for key in ("id", "status", "title", "found", "limit", "do")),
-    ),
-    "trade": (
-        "truths",
-        *(f"cheapest.{key}" for key in
-          ("number", "question", "of", "rung", "level", "shown", "seconds", "note")),
-        *(f"boards.{key}" for key in
-          ("number", "omega", "b", "boards", "ok", "lost", "gained", "undecided", "difference",
-           "low", "high")),
-    ),
-    "bench": tuple(
-        f"records.{key}" for key in
-        ("file", "omega", "response", "sure", "others", "wanted", "as_wanted", "advice")
-    ),
-}  # fmt: skip
-"""Keys that the section of a verb's answer shows, of each item where there is a list."""
+SHOWN: Mapping[str, type] = {
+    "cure": CureShown,
+    "rules": RulesShown,
+    "trade": TradeShown,
+    "bench": BenchShown,
+}
+"""What the section of a verb's answer shows."""
 
 
-def is_whole(verb: str, answer: Answer) -> bool:
-    """Whether an answer has every key of ``NEEDED``: earlier versions wrote fewer."""
-    return all(_has(answer, path.split(".")) for path in NEEDED[verb])
-
-
-def _has(value: Any, keys: Sequence[str]) -> bool:
-    if not keys:
-        return True
-    if isinstance(value, Sequence):
-        return all(_has(item, keys) for item in value)
-    return keys[0] in value and _has(value[keys[0]], keys[1:])
+def is_whole(verb: str, answer: object) -> bool:
+    """Whether an answer has all that its section shows: earlier versions wrote fewer keys."""
+    try:
+        TypeAdapter(SHOWN[verb]).validate_python(answer)
+    except ValidationError:
+        return False
+    return True
 
 
 COMMANDS: Mapping[str, str] = {
@@ -220,7 +203,7 @@ def older_section(verb: str, files: Sequence[str]) -> PageSection:
     return PageSection(verb.capitalize(), blocks, verb, "", "Of an earlier version.")
 
 
-SECTIONS: Mapping[str, Callable[[Answer, Sequence[str]], PageSection]] = {
+SECTIONS: Mapping[str, Callable[[Any, Sequence[str]], PageSection]] = {
     "cure": repair_section,
     "rules": rules_section,
     "trade": trade_section,

@@ -22,9 +22,9 @@ order in each, and by `FLOOR` beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import EquationCheckRow
 
 DEPTH = 0.5
 """Penetration at the far end of a contact's line, over the clearance, where the responses go as
@@ -331,7 +334,7 @@ class EquationCheck:
         return f"{verdict}: {'; '.join(str(f) for f in self.findings if not f.passed)}"
 
     @classmethod
-    def read(cls, record: Mapping[str, Any]) -> EquationCheck:
+    def read(cls, record: EquationCheckRow) -> EquationCheck:
         """The check that ``as_dict`` wrote."""
 
         def number(value: float | None) -> float:
@@ -344,12 +347,21 @@ class EquationCheck:
             )
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> EquationCheckRow:
         return {
             "passed": self.passed,
             "low_hz": self.low,
             "high_hz": self.high,
-            "findings": [{**f.__dict__, "passed": f.passed} for f in self.findings],
+            "findings": [
+                {
+                    "name": f.name,
+                    "deviation": f.deviation,
+                    "bound": f.bound,
+                    "reason": f.reason,
+                    "passed": f.passed,
+                }
+                for f in self.findings
+            ],
         }
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from designer.base.defaults import cores
 from designer.base.errors import InputError
@@ -20,6 +20,7 @@ from designer.verbs.tables import YES_NO, drive_cells, files as written
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.bench_answer import BenchJson, BenchKeys, BoardRecord, RecordRow
     from designer.jobs.bench_job import BenchedRecord
     from designer.workbench.fitted_board import FittedBoard
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 class BenchAnswer:
     """What the verb ``bench`` answers. It is a sequence of the records too."""
 
-    answer: dict[str, Any]
+    answer: BenchJson
     """The JSON object (docs/contract.md)."""
     records: tuple[BenchedRecord, ...]
     """Each record with what it shows."""
@@ -184,18 +185,18 @@ def bench(
         "fit": bool(fit or boards or decays),
         "boards": boards,
     }
-    common = {
+    common: BenchKeys = {
         "format": 1,
         "title": synthesis.modelfile.title,
         "boards": [board.as_dict(synthesis.modelfile.si) for board in fitted.values()],
-        "spread": estimated_spread([*fits.values()]) if boards and fits else (),
+        "spread": plain(estimated_spread([*fits.values()]) if boards and fits else ()),
         "files": [] if place is None else [NAME, bench_job.PAGE, *names, *lists],
         "design_sha256": design_hash(path),
         "provenance": provenance(synthesis.modelfile, catalog.hash, settings=settings),
     }
 
     def result(records: Sequence[BenchedRecord]) -> BenchAnswer:
-        answer = {
+        answer: BenchJson = {
             **common,
             "records": [
                 bench_job.record_json(each, scales.seconds, synthesis.modelfile.si)
@@ -237,9 +238,9 @@ def channels_of(text: str) -> dict[str, str]:
     return named_channels
 
 
-def _row(record: Mapping[str, Any]) -> dict[str, Any]:
+def _row(record: RecordRow) -> dict[str, object]:
     keys = ("file", "omega", "response", "sure", "others", "wanted", "as_wanted")
-    return {key: record[key] for key in keys}
+    return {key: record.get(key) for key in keys}
 
 
 def show(result: BenchAnswer) -> None:
@@ -250,7 +251,7 @@ def show(result: BenchAnswer) -> None:
         written(result.place, False)
 
 
-def tables(answer: Mapping[str, Any]) -> None:
+def tables(answer: BenchJson) -> None:
     """What each record shows; then what is not sure, and what would tell."""
     rows = answer["records"]
     table(
@@ -263,7 +264,7 @@ def tables(answer: Mapping[str, Any]) -> None:
                 "shows": r["response"],
                 "sure": YES_NO[r["sure"]],
                 "wanted there": r["wanted"] or "-",
-                "exact circuit": (r["exact_circuit"] or {}).get("response", "-"),
+                "exact circuit": "-" if (e := r["exact_circuit"]) is None else e["response"],
             }
             for r in rows
         ),
@@ -284,7 +285,7 @@ def tables(answer: Mapping[str, Any]) -> None:
         )
 
 
-def _fitted(board: Mapping[str, Any]) -> None:
+def _fitted(board: BoardRecord) -> None:
     """What the records tell of a board, and what to turn on it."""
     of = f" {board['board']}" if board["board"] else ""
     if board["reason"]:

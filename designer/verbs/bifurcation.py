@@ -18,6 +18,16 @@ from designer.verbs.declared import Jobs, Kind, Out, Overwrite, Resume, Seed, So
 from designer.verbs.tables import YES_NO, files
 
 if TYPE_CHECKING:
+    from designer.answers.bifurcation_answer import (
+        BasinsAnswer,
+        CurveRow,
+        EndRow,
+        MapAnswer,
+        MeetingRow,
+        PointRow,
+        SweepAnswer,
+        WindowRow,
+    )
     from designer.jobs.bifurcation_job import BifurcationResult
 
 LONGEST = 40
@@ -184,13 +194,15 @@ def show(result: BifurcationResult) -> None:
     answer = result.answer
     if answer["kind"] == "sweep":
         _sweep(answer, result.ends)
+    elif answer["kind"] == "map":
+        _map(answer)
     else:
-        {"map": _map, "basins": _basins}[answer["kind"]](answer)
+        _basins(answer)
     if result.folder is not None:
         files(result.folder, result.reused)
 
 
-def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
+def _sweep(answer: SweepAnswer, ends: tuple[str, str]) -> None:
     from designer.check.curved_laws import misfits_in
 
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
@@ -246,7 +258,7 @@ def _sweep(answer: Mapping[str, Any], ends: tuple[str, str]) -> None:
                 say(text)
 
 
-def _taken(answer: Mapping[str, Any]) -> str:
+def _taken(answer: SweepAnswer) -> str:
     """What was swept, with the unit that its numbers were taken in; "" of older answers."""
     if "from" not in answer:
         return ""
@@ -276,7 +288,7 @@ def _written(axis: Mapping[str, Any], *, in_si: bool) -> Written:
     return lambda value: f"{value:.6g}"
 
 
-def _shares(answer: Mapping[str, Any], written: Written) -> None:
+def _shares(answer: SweepAnswer, written: Written) -> None:
     """Every attractor that random starts ended on, the largest share of all starts first."""
     shares, steps = answer["shares"], answer["steps"]
     attractors = sorted(shares["attractors"], key=lambda a: -sum(s["count"] for s in a["steps"]))
@@ -300,7 +312,7 @@ def _shares(answer: Mapping[str, Any], written: Written) -> None:
         say(f"and {len(attractors) - LONGEST} rarer ones (--json has them all)")
 
 
-def _curves(answer: Mapping[str, Any], written: tuple[Written, Written]) -> None:
+def _curves(answer: SweepAnswer, written: tuple[Written, Written]) -> None:
     """Every curve, and below them the points of codimension two."""
     first, second = answer["parameter"], answer["and"]["name"]
     switched = any(c.get("begun_at") for c in answer["curves"])
@@ -330,13 +342,13 @@ def _curves(answer: Mapping[str, Any], written: tuple[Written, Written]) -> None
             say(text + _other_curve(met))
 
 
-def _begun_at(curve: Mapping[str, Any]) -> str:
+def _begun_at(curve: CurveRow) -> str:
     """Where a curve was switched to."""
     at = curve.get("begun_at")
     return f"curve {at['curve']}, {at['kind']}" if at else ""
 
 
-def _other_curve(met: Mapping[str, Any]) -> str:
+def _other_curve(met: MeetingRow) -> str:
     """What became of the other curve at a point of codimension two; "" in older answers."""
     if not met.get("status"):
         return ""
@@ -348,7 +360,7 @@ def _both(values: Sequence[float], written: tuple[Written, Written]) -> str:
     return ", ".join(write(value) for write, value in zip(written, values, strict=True))
 
 
-def _region(answer: Mapping[str, Any], written: tuple[Written, Written]) -> Iterator[str]:
+def _region(answer: SweepAnswer, written: tuple[Written, Written]) -> Iterator[str]:
     """What bounds the region of a response, and where to sit in it."""
     region, names = answer["region"], (answer["parameter"], answer["and"]["name"])
 
@@ -376,7 +388,7 @@ def _region(answer: Mapping[str, Any], written: tuple[Written, Written]) -> Iter
         )
 
 
-def _exponents(window: Mapping[str, Any]) -> str:
+def _exponents(window: WindowRow) -> str:
     """Least and greatest exponent of an aperiodic window, with the largest standard error."""
     if "lyapunov" not in window:
         return ""
@@ -391,63 +403,61 @@ def _in_si_unit(asked: str, si: str) -> bool:
     return text.endswith(si) and not text.endswith("rad/s")
 
 
-def _ends(window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool) -> dict[str, str]:
+def _ends(window: WindowRow, unit: str, si: str | None, *, in_si: bool) -> dict[str, str]:
     """The ends of a window in the swept parameter's own unit and in the SI unit, if it has one.
 
     in_si : whether the SI unit comes first.
     """
-    names = ("from", "to")
+    ends = {"from": window["from"], "to": window["to"]}
     if unit and not si:
-        return {end: quantity_text(window[end], unit.strip(" []"), 6) for end in names}
-    own = {f"{end}{unit}": f"{window[end]:.6g}" for end in names}
-    other = {f"{end} [{si}]": _si(window, end, si) for end in names} if si else {}
+        return {end: quantity_text(value, unit.strip(" []"), 6) for end, value in ends.items()}
+    own = {f"{end}{unit}": f"{value:.6g}" for end, value in ends.items()}
+    other = {f"{end} [{si}]": _si(window, end, si) for end in ends} if si else {}
     return {**other, **own} if in_si else {**own, **other}
 
 
-def _family(window: Mapping[str, Any]) -> str:
+def _family(window: WindowRow) -> str:
     """The number of a periodic window's family."""
     return "-" if window["family"] is None else str(window["family"])
 
 
-def _narrow(windows: Iterable[Mapping[str, Any]]) -> bool:
+def _narrow(windows: Iterable[WindowRow]) -> bool:
     """Whether ends were not looked for because too few steps show a window."""
     from designer.bifurcations.window_ends import LEAST_STEPS
 
     return any(_not_sought(w) and w["steps"] < LEAST_STEPS for w in windows)
 
 
-def _not_sought(window: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _not_sought(window: WindowRow) -> list[EndRow]:
     """The ends of a window that were not looked for."""
-    ends = [window[key] for key in ("from_end", "to_end") if key in window]
     from designer.bifurcations.window_ends import NOT_SOUGHT
 
-    return [end for end in ends if end["kind"] == NOT_SOUGHT]
+    ends = window.get("from_end"), window.get("to_end")
+    return [end for end in ends if end is not None and end["kind"] == NOT_SOUGHT]
 
 
-def _located(
-    window: Mapping[str, Any], unit: str, si: str | None, *, in_si: bool
-) -> dict[str, str]:
+def _located(window: WindowRow, unit: str, si: str | None, *, in_si: bool) -> dict[str, str]:
     """What ends a window on the branch that its response lies on, and where."""
     from designer.bifurcations.continuation import End
     from designer.bifurcations.window_ends import NOT_SOUGHT
     from designer.bifurcations.windows import NOT_LOCATED
 
     out = {}
-    for column, key in (("lower end", "from_end"), ("upper end", "to_end")):
-        end = window.get(key)
+    ends = {"lower end": window.get("from_end"), "upper end": window.get("to_end")}
+    for column, end in ends.items():
         kind = "" if end is None else str(end["kind"])
         text = "-" if kind == NOT_SOUGHT else kind.replace("-", " ")
         if end is not None and kind not in (End.LIMIT, NOT_SOUGHT):
-            own = quantity_text(end["value"], unit, 6) if unit else f"{end['value']:.6g}"
+            value = end["value"]
+            assert value is not None
+            own = quantity_text(value, unit, 6) if unit else f"{value:.6g}"
             place = _si(end, "value", si) if si and in_si else own
             text += f", known to {place}" if kind == NOT_LOCATED else f" {place}"
         out[column] = text
     return out
 
 
-def _points(
-    points: Sequence[Mapping[str, Any]], unit: str, si: str | None, *, in_si: bool
-) -> Iterator[str]:
+def _points(points: Sequence[PointRow], unit: str, si: str | None, *, in_si: bool) -> Iterator[str]:
     """What happens at each point on its branch, and below it what the sweep's tracks show.
 
     in_si : whether the place comes in the SI unit first.
@@ -475,7 +485,7 @@ def _si(row: Mapping[str, Any], key: str, unit: str) -> str:
     return value_text(row[f"{key}_{suffix(unit)}"], unit, digits=6)
 
 
-def _map(answer: Mapping[str, Any]) -> None:
+def _map(answer: MapAnswer) -> None:
     total = answer["x"]["steps"] * answer["y"]["steps"]
     counts = list(answer["counts"].items())[:LONGEST]
     table(
@@ -484,7 +494,7 @@ def _map(answer: Mapping[str, Any]) -> None:
     )
 
 
-def _basins(answer: Mapping[str, Any]) -> None:
+def _basins(answer: BasinsAnswer) -> None:
     table(
         "Attractors",
         (

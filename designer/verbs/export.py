@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from designer.base.defaults import Dialect
 from designer.base.errors import InputError
@@ -14,6 +14,7 @@ from designer.verbs.declared import Out, Overwrite, Resume, Source, Verb, option
 from designer.verbs.tables import files
 
 if TYPE_CHECKING:
+    from designer.answers.export_answer import ExportJson
     from designer.jobs.export_job import ExportResult
 
 
@@ -148,7 +149,7 @@ def show(result: ExportResult) -> None:
         next_steps.show(next_steps.after_board(result.folder))
 
 
-def tables(folder: Path, reused: bool, refused: Sequence[str], answer: Mapping[str, Any]) -> None:
+def tables(folder: Path, reused: bool, refused: Sequence[str], answer: ExportJson) -> None:
     """Where the files are and how a board was routed, or why an order is refused."""
     if refused:
         say("\n".join(["No order is written, since the board is not finished:", *refused]))

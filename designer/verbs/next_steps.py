@@ -5,11 +5,17 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.si_unit import is_angular, value_text
 from designer.dynamics.orbit import WITHOUT_PERIOD
 from designer.verbs.console import say
+
+if TYPE_CHECKING:
+    from designer.answers.cure_answer import CureAnswer
+    from designer.answers.design_answer import DesignAnswer
+    from designer.answers.rules_answer import RulesJson
+    from designer.answers.study_answer import RunAnswer, StudyAnswer
 
 Step = tuple[str, str]
 """A command line, and what it is for."""
@@ -36,7 +42,7 @@ def after_model(model: Path) -> Iterator[Step]:
     yield _step("the whole job", "run", model, "--out", Path("out") / model.stem)
 
 
-def after_design(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+def after_design(folder: Path, answer: DesignAnswer) -> Iterator[Step]:
     """With a design that nothing was counted of. answer : of ``synthesise``."""
     yield from after_response(folder, answer["knobs"])
     failing = list(after_failed_rules(folder, answer))
@@ -47,7 +53,7 @@ def after_design(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
 
 
 def after_study(
-    folder: Path, answer: Mapping[str, Any], *, repaired: bool = False
+    folder: Path, answer: StudyAnswer | RunAnswer, *, repaired: bool = False
 ) -> Iterator[Step]:
     """With a study. answer : of ``tolerance`` or ``run``. repaired : whether a repair was sought
     already."""
@@ -55,7 +61,11 @@ def after_study(
     yield f"open {shlex.quote(str(folder / 'report.html'))}", "the report"
     yield from after_failed_rules(folder, answer)
     yield from after_response(folder, responses)
-    low = any(r["found"] and r["yield"] is not None and r["rate"] < GOOD for r in responses)
+    low = any(
+        # Where no board has an answer there is no rate.
+        r["found"] and r["yield"] is not None and (r["rate"] or 0.0) < GOOD
+        for r in responses
+    )
     # A search follows orbits.
     if (
         low
@@ -68,7 +78,7 @@ def after_study(
     yield from after_board(folder)
 
 
-def after_repair(folder: Path, cure: Mapping[str, Any]) -> Iterator[Step]:
+def after_repair(folder: Path, cure: CureAnswer) -> Iterator[Step]:
     """With a repaired design in a folder of its own. cure : the JSON object of ``cure.json``."""
     rare = any(r["after"].get("rare") for r in cure["responses"])
     more = [*(["--rare"] if rare else []), *(["--tuned"] if cure["upgrades"]["trim"] else [])]
@@ -91,7 +101,7 @@ def after_board(folder: Path) -> Iterator[Step]:
         yield _step("files to order the board", "export", folder, "--fab", "jlcpcb")
 
 
-def after_rules(folder: Path, answer: Mapping[str, Any]) -> Iterator[Step]:
+def after_rules(folder: Path, answer: RulesJson) -> Iterator[Step]:
     """With rules that no board was given for. answer : of ``rules``."""
     board = _board(folder)
     if answer["board"] is None and board is not None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
@@ -19,6 +19,8 @@ from designer.verbs.declared import DesignDir, Verb, option
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.rules_answer import RulesJson
+    from designer.answers.shared_rows import ProvenanceRow
     from designer.base.manifest import Stages
     from designer.board.kicad_reader import BoardFile
     from designer.catalog.design_rule import RuleOutcome
@@ -31,7 +33,7 @@ NAME = "rules.json"
 class RulesResult:
     """What the verb ``rules`` answers."""
 
-    answer: dict[str, Any]
+    answer: RulesJson
     """The JSON object (docs/contract.md), which is the folder's ``rules.json``."""
     passed: bool
     """Whether no rule fails; what was not run does not fail."""
@@ -46,7 +48,7 @@ class RulesResult:
         from designer.catalog.design_rule import PASS
 
         names = ("id", "status", "found", "limit", "do")
-        rows = [{n: r[n] for n in names} for r in self.answer["rules"] if r["status"] != PASS]
+        rows = [{n: r.get(n) for n in names} for r in self.answer["rules"] if r["status"] != PASS]
         counts = ", ".join(f"{number} {status}" for status, number in self.answer["counts"].items())
         return table_html(self.answer["title"], rows, counts)
 
@@ -123,7 +125,7 @@ def rules(
     }
     settings = {"board_sha256": inputs["board"], "kicad": checks.kicad, "fabs": list(fab)}
     origin = provenance(synthesis.modelfile, catalog.hash, settings=settings)
-    answer = plain(
+    answer: RulesJson = plain(
         _json(synthesis, board_file, checks.outcomes, origin, time.perf_counter() - began)
     )
     place = Folder(path)
@@ -147,17 +149,21 @@ def _json(
     synthesis: Synthesis,
     board: BoardFile | None,
     outcomes: Sequence[RuleOutcome],
-    origin: dict[str, Any],
+    origin: ProvenanceRow,
     seconds: float,
-) -> dict[str, Any]:
+) -> RulesJson:
     from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 
-    count = {status: sum(o.status == status for o in outcomes) for status in (PASS, FAIL, NOT_RUN)}
+    statuses = [o.status for o in outcomes]
     return {
         "format": 1,
         "title": synthesis.modelfile.title,
         "board": None if board is None else board.path.name,
-        "counts": count,
+        "counts": {
+            "pass": statuses.count(PASS),
+            "fail": statuses.count(FAIL),
+            "not run": statuses.count(NOT_RUN),
+        },
         "complete": not any(o.open for o in outcomes),
         "rules": [o.as_dict() for o in outcomes],
         "provenance": origin,
@@ -173,7 +179,7 @@ def show(result: RulesResult) -> None:
     next_steps.show(next_steps.after_rules(result.folder, result.answer))
 
 
-def tables(answer: Mapping[str, Any]) -> None:
+def tables(answer: RulesJson) -> None:
     """Every rule with its figure and what was found; then what to do about those that fail."""
     from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
 

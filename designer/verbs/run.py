@@ -19,7 +19,14 @@ from designer.verbs.declared import (
     Source,
     Verb,
 )
-from designer.verbs.tables import design_written, studied, synthesised, tolerance, whole_job
+from designer.verbs.tables import (
+    design_written,
+    studied,
+    synthesised,
+    tolerance,
+    whole_job,
+    worked_out_last,
+)
 
 if TYPE_CHECKING:
     from designer.catalog.parts_catalog import Catalog
@@ -76,6 +83,7 @@ def show(result: JobOutcome) -> None:
     """The tables, where the files are, and what may be done next."""
     parts_stand_above = result.folder is not None and not result.reused
     tables = studied if parts_stand_above else whole_job
+    tables = worked_out_last if result.shown else tables
     design_written(result, result.answer, tables, next_steps.after_study)
 
 

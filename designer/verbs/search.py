@@ -19,6 +19,8 @@ from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Sourc
 from designer.verbs.tables import design_written, drive_cells, whole_job
 
 if TYPE_CHECKING:
+    from designer.answers.cure_answer import CureAnswer
+    from designer.answers.search_answer import ConfirmedCure, SearchAnswer
     from designer.jobs.job_outcome import JobOutcome
     from designer.jobs.options import Options
     from designer.jobs.repair_job import CureResult
@@ -196,13 +198,13 @@ def show(result: JobOutcome | CureResult) -> None:
         _show_repair(result.answer)
 
 
-def _show_repair(repair: Mapping[str, Any]) -> None:
+def _show_repair(repair: CureAnswer) -> None:
     from designer.centering import repair_table
 
     tell(repair_table.text(repair))
 
 
-def _after(folder: Path, answer: Mapping[str, Any]) -> Iterator[next_steps.Step]:
+def _after(folder: Path, answer: SearchAnswer) -> Iterator[next_steps.Step]:
     """What may be done next: with the repaired design, where there is one."""
     cure = answer.get("cure")
     if cure is None or not cure["reached"]:
@@ -211,7 +213,7 @@ def _after(folder: Path, answer: Mapping[str, Any]) -> Iterator[next_steps.Step]
         yield from next_steps.after_repair(folder / CURED, cure)
 
 
-def tables(answer: Mapping[str, Any]) -> None:
+def tables(answer: SearchAnswer) -> None:
     """A run; then the responses at their places, what limits them, what each lever is worth; then
     the repair, where one was asked for."""
     whole_job(answer)
@@ -254,7 +256,7 @@ def tables(answer: Mapping[str, Any]) -> None:
         _show_confirmation(answer["cure"])
 
 
-def _show_confirmation(cure: Mapping[str, Any]) -> None:
+def _show_confirmation(cure: ConfirmedCure) -> None:
     """What ngspice says of the repaired design's boards, where there is one."""
     if (confirmation := cure.get("confirmation")) is not None:
         pairs = zip(cure["responses"], confirmation["responses"], strict=True)

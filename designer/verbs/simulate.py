@@ -23,6 +23,13 @@ from designer.verbs.tables import YES_NO, pictures, response_cells, untrusted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.shared_rows import ShareRow
+    from designer.answers.simulate_answer import (
+        ClearanceReach,
+        ResponseRow,
+        SimulateAnswer,
+        StartsRow,
+    )
     from designer.base.arrays import Array
     from designer.check.simulation import Simulated
     from designer.check.stick_phases import Sticking
@@ -35,7 +42,7 @@ if TYPE_CHECKING:
 class SimulationResult:
     """What the verb ``simulate`` answers. It is a sequence of the responses too."""
 
-    answer: dict[str, Any]
+    answer: SimulateAnswer
     """The JSON object (docs/contract.md)."""
     simulated: tuple[Simulated, ...]
     """Each response with its orbits."""
@@ -274,7 +281,7 @@ def _float(name: str, value: Real) -> float:
         raise InputError(None, name, value, "a number that a float can hold") from None
 
 
-def tables(answer: Mapping[str, Any]) -> None:
+def tables(answer: SimulateAnswer) -> None:
     """The responses on one engine."""
     from designer.check.curved_laws import misfits_in
     from designer.check.stick_phases import sticking_in
@@ -304,7 +311,7 @@ def tables(answer: Mapping[str, Any]) -> None:
         table("Displacements from the base", from_base, gap=1)
     met = [(r, each) for r in rows for each in r.get("in_clearances", ())]
     if met:
-        sides = [side for side in ("upper", "lower") if any(one[side] for _, one in met)]
+        sides = [side for side in SIDES if any(one[side] for _, one in met)]
         in_them = (_in_clearance(r, one, sides, in_si=in_si) for r, one in met)
         table("In the clearances: furthest into each stop, and fastest impact", in_them, gap=1)
     held = [(r, each) for r in rows for each in sticking_in(r)]
@@ -320,35 +327,39 @@ def tables(answer: Mapping[str, Any]) -> None:
         for each in (r, *r["others"]):
             for misfit in misfits_in(each):
                 say(f"{place}: {misfit.text(each['response'], in_si=in_si)}")
-        if r["frequencies"] is not None:
-            say(f"{place}: {frequencies(r)}")
+        if pair := r["frequencies"]:
+            say(f"{place}: {_frequencies(pair, r.get('frequencies_hz'))}")
         for other in r["others"]:
-            if other["frequencies"] is not None:
-                say(f"{place}: of the others, {frequencies(other)}")
+            if pair := other["frequencies"]:
+                words = _frequencies(pair, other.get("frequencies_hz"))
+                say(f"{place}: of the others, {words}")
         if r["lyapunov_error"] is not None:
             growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}{' 1/s' if in_si else ''}"
             say(f"{place}: largest exponent {growth} (standard error)")
-        for line in untrusted({"this response": r.get("trust")}):
+        for line in untrusted({"this response": r["trust"]}):
             say(f"{place}: {line}")
 
 
-def _place(row: Mapping[str, Any], *, in_si: bool) -> str:
+SIDES: Sequence[Literal["upper", "lower"]] = ("upper", "lower")
+
+
+def _place(row: ResponseRow, *, in_si: bool) -> str:
     """The drive frequency that a response belongs to."""
     return value_text(row["frequency_hz"], "Hz", 6) if in_si else f"ω = {row['omega']:g}"
 
 
-def _from_base(row: Mapping[str, Any], masses: Sequence[str], *, in_si: bool) -> dict[str, str]:
+def _from_base(row: ResponseRow, masses: Sequence[str], *, in_si: bool) -> dict[str, str]:
     """How far the masses go from a base that moves, and how far that goes."""
     lows, highs = row["from_base_min"], row["from_base_max"]
     cells = {"at": _place(row, in_si=in_si), "response": row["response"]}
     for i, name in enumerate(masses):
-        ends = () if lows is None else (lows[i], highs[i])
+        ends = () if lows is None or highs is None else (lows[i], highs[i])
         cells[f"x{i + 1} − y ({name})"] = _between(ends, in_si=in_si)
     y = row["base_amplitude"]
     return {**cells, "y (base)": f"± {value_text(y, 'm') if in_si else format(y, '.6g')}"}
 
 
-def _holding(row: Mapping[str, Any], held: Sticking, *, in_si: bool) -> dict[str, str]:
+def _holding(row: ResponseRow, held: Sticking, *, in_si: bool) -> dict[str, str]:
     """What a friction does over a response."""
     often = "always" if held.share else "never"
     if held.phases:
@@ -366,18 +377,21 @@ def _holding(row: Mapping[str, Any], held: Sticking, *, in_si: bool) -> dict[str
 
 
 def _in_clearance(
-    row: Mapping[str, Any], met: Mapping[str, Any], sides: Iterable[str], *, in_si: bool
+    row: ResponseRow,
+    met: ClearanceReach,
+    sides: Iterable[Literal["upper", "lower"]],
+    *,
+    in_si: bool,
 ) -> dict[str, str]:
     """How far a response goes in a clearance and into its stops, and the fastest impact on each."""
     stated = "max_m" in met  # beside the values of a dimensionless model
-    length, rate = ("_m", "_m_s") if stated else ("", "")
 
     def text(value: float | None, unit: str) -> str:
         if value is None:
             return "-"
         return value_text(value, unit) if stated or in_si else f"{value:.6g}"
 
-    low, high = met[f"min{length}"], met[f"max{length}"]
+    low, high = (met["min_m"], met["max_m"]) if stated else (met["min"], met["max"])
     cells = {
         "at": _place(row, in_si=in_si),
         "response": row["response"],
@@ -385,10 +399,13 @@ def _in_clearance(
         "displacement": "-" if low is None else f"{text(low, 'm')} to {text(high, 'm')}",
     }
     for side in sides:
-        stop = met[side] or {}
-        depth = stop.get(f"depth{length}")
+        stop, depth, speed = met[side], None, None
+        if stop is not None:
+            depth, speed = stop["depth"], stop["speed"]
+            if stated:
+                depth, speed = stop["depth_m"], stop["speed_m_s"]
         cells[f"{side} depth"] = text(depth if (depth or 0.0) > 0.0 else None, "m")
-        cells[f"{side} speed"] = text(stop.get(f"speed{rate}"), "m/s")
+        cells[f"{side} speed"] = text(speed, "m/s")
     return cells
 
 
@@ -396,40 +413,36 @@ def _between(ends: Sequence[float], *, in_si: bool) -> str:
     return " to ".join(value_text(x, "m") if in_si else f"{x:.6g}" for x in ends) or "-"
 
 
-def frequencies(row: Mapping[str, Any]) -> str:
+def _frequencies(pair: Sequence[float], in_hertz: Sequence[float] | None) -> str:
     """The two frequencies of a quasi-periodic motion, and their ratio."""
-    drive, second = row["frequencies"]
-    in_hertz = row.get("frequencies_hz")
+    drive, second = pair
     if in_hertz is None:
-        pair = f"ω {drive:.6g} of the drive and {second:.7g}"
+        words = f"ω {drive:.6g} of the drive and {second:.7g}"
     else:
         first, other = value_text(in_hertz[0], "Hz"), value_text(in_hertz[1], "Hz", 7)
-        pair = f"{first} of the drive and {other}"
-    return f"quasi-periodic with the frequencies {pair}, {second / drive:.7g} times the drive's"
+        words = f"{first} of the drive and {other}"
+    return f"quasi-periodic with the frequencies {words}, {second / drive:.7g} times the drive's"
 
 
-def _reach(
-    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], masses: Sequence[str]
-) -> dict[str, str]:
+def _reach(row: ResponseRow, rows: Sequence[ResponseRow], masses: Sequence[str]) -> dict[str, str]:
     """How far the masses go: the first one, or each of those that have names."""
     in_si = "frequency_hz" in rows[0]
     cells = {}
     for i, name in enumerate(masses):
-        ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
+        low, high = row["x_min"], row["x_max"]
+        ends = () if low is None or high is None else (low[i], high[i])
         cells[f"x{i + 1} ({name})"] = _between(ends, in_si=in_si)
     if masses:
         return cells
-    si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
-    for head, key in {"x1 max": "x1_max", "x1 min": "x1_min"}.items():
-        cells[head] = "-" if row[key] is None else f"{row[key]:.6g}"
-    for head, key in si.items():
-        cells[head] = "-" if row[key] is None else value_text(row[key], "m")
+    for head, end in {"x1 max": row["x1_max"], "x1 min": row["x1_min"]}.items():
+        cells[head] = "-" if end is None else f"{end:.6g}"
+    if in_si:
+        for head, end in {"x1 max": row["x1_max_m"], "x1 min": row["x1_min_m"]}.items():
+            cells[f"{head} (SI)"] = "-" if end is None else value_text(end, "m")
     return cells
 
 
-def coexisting(
-    starts: Mapping[str, Any], masses: Sequence[str] = (), *, in_si: bool = False
-) -> str:
+def coexisting(starts: StartsRow, masses: Sequence[str] = (), *, in_si: bool = False) -> str:
     """Where the starts that were drawn from a box end, the largest share first.
 
     masses : their names, if they have some. in_si : whether numbers are SI values.
@@ -442,8 +455,9 @@ def coexisting(
     names = Counter(a["response"] for a in starts["attractors"])
     for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
         name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
-        if names[a["response"]] > 1 and a["x1_min"] is not None:
-            name += f" (x1 {text(a['x1_min'], 'm')} to {text(a['x1_max'], 'm')})"
+        low, high = a["x1_min"], a["x1_max"]
+        if names[a["response"]] > 1 and low is not None and high is not None:
+            name += f" (x1 {text(low, 'm')} to {text(high, 'm')})"
         parts.append(f"{name} {_share(a)}")
     if starts["not_settled"]["count"]:
         parts.append(f"not settled {_share(starts['not_settled'])}")
@@ -467,7 +481,7 @@ def _response_cells_in_si(
     return {"frequency": cells["mechanism"], "expected": cells["expected"]}
 
 
-def _share(counted: Mapping[str, Any]) -> str:
+def _share(counted: ShareRow) -> str:
     """A share with its 95 % interval."""
     low, high = 100 * counted["low"], 100 * counted["high"]
     return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from designer.base.defaults import SEED, cores
 from designer.base.errors import InputError
@@ -16,6 +15,7 @@ from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, 
 from designer.verbs.tables import design_written, not_good_enough, synthesised
 
 if TYPE_CHECKING:
+    from designer.answers.design_answer import Comparison, DesignAnswer
     from designer.base.second_process import Ask
     from designer.catalog.parts_catalog import Catalog
     from designer.jobs.job_outcome import JobOutcome
@@ -117,21 +117,21 @@ def show(result: JobOutcome) -> None:
     )
 
 
-def tables(answer: Mapping[str, Any]) -> None:
+def tables(answer: DesignAnswer) -> None:
     """The design, and beside the paper's where that was asked for."""
     synthesised(answer)
     if "comparison" in answer:
         _compared(answer["comparison"])
 
 
-def _after_parts(answer: Mapping[str, Any]) -> None:
+def _after_parts(answer: DesignAnswer) -> None:
     """What was not known yet when the parts were shown."""
     not_good_enough(answer)
     if "comparison" in answer:
         _compared(answer["comparison"])
 
 
-def _compared(answer: Mapping[str, Any]) -> None:
+def _compared(answer: Comparison) -> None:
     """The design beside the paper's."""
     from designer.report import compare_table
 

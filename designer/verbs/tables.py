@@ -5,34 +5,43 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from designer.base.attribution_noise import lacks_noise
-from designer.base.rare_words import any_lost_words, boards_text, share_text
+from designer.answers.attribution_noise import lacks_noise
+from designer.answers.rare_words import any_lost_words, boards_text, share_text
 from designer.base.si_unit import acceleration_text, drive_text, is_angular, value_text
 from designer.base.units import format_quantity
 from designer.verbs.console import grid, say, table
 
 if TYPE_CHECKING:
+    from designer.answers.design_answer import DesignKeys, KnobRow
+    from designer.answers.shared_rows import IntervalRow, TrustVerdict
+    from designer.answers.study_answer import (
+        MeasuredBoard,
+        RareLossKeys,
+        RatedCounts,
+        RunAnswer,
+        StudyAnswer,
+        StudyKeys,
+        StudyResponse,
+        YieldCounts,
+    )
     from designer.jobs.job_outcome import JobOutcome
     from designer.verbs.next_steps import Step
 
+Shown = TypeVar("Shown")
 YES_NO = {True: "yes", False: "no", None: "-"}
 
 
 def design_written(
     outcome: JobOutcome,
-    answer: Mapping[str, Any],
-    tables: Callable[[Mapping[str, Any]], None],
-    after: Callable[[Path, Mapping[str, Any]], Iterable[Step]],
+    answer: Shown,
+    tables: Callable[[Shown], None],
+    after: Callable[[Path, Shown], Iterable[Step]],
 ) -> None:
     """What a verb that writes a design folder has to say. answer : of the outcome, as it is
     printed. tables : shows it. after : what may be done next."""
-    if outcome.shown:
-        attribution_status(answer)
-        _rare(answer)
-    else:
-        tables(answer)
+    tables(answer)
     if outcome.folder is not None:
         from designer.verbs import next_steps
 
@@ -40,30 +49,38 @@ def design_written(
         next_steps.show(after(outcome.folder, answer))
 
 
-def whole_job(answer: Mapping[str, Any]) -> None:
+def whole_job(answer: RunAnswer) -> None:
     """Parts and errors, then the responses."""
     synthesised(answer)
     tolerance(answer)
 
 
-def studied(answer: Mapping[str, Any]) -> None:
+def studied(answer: RunAnswer) -> None:
     """What is not good enough, then the responses; the parts were shown before."""
     not_good_enough(answer)
     tolerance(answer)
 
 
-def not_good_enough(answer: Mapping[str, Any]) -> None:
+def worked_out_last(answer: StudyKeys) -> None:
+    """Attribution and rare losses; all else was shown before."""
+    attribution_status(answer)
+    _rare(answer)
+
+
+def not_good_enough(answer: DesignKeys) -> None:
     """What stands before everything else that a verb says of a design, where there is
     something."""
     for warning in answer.get("warnings", ()):
         say(f"Not good enough: {warning}")
     if failed := answer.get("failed_rules"):
-        columns = {"rule": "id", "found": "found", "limit": "limit", "what to do": "do"}
-        rows = ({head: rule[key] for head, key in columns.items()} for rule in failed)
+        rows = (
+            {"rule": r["id"], "found": r["found"], "limit": r["limit"], "what to do": r["do"]}
+            for r in failed
+        )
         table("Design rules that fail", rows)
 
 
-def synthesised(answer: Mapping[str, Any]) -> None:
+def synthesised(answer: DesignKeys) -> None:
     """What is not good enough; the chosen parts, their error and the generator's settings."""
     not_good_enough(answer)
     equal: dict[tuple[str, float], list[str]] = defaultdict(list)
@@ -87,7 +104,8 @@ def synthesised(answer: Mapping[str, Any]) -> None:
             for name, g in answer["better_grades"].items()
         }
         say(better_grades_text(better))
-    if reason := (answer.get("dead_zone") or {}).get("reason"):
+    stage = answer["dead_zone"]
+    if stage is not None and (reason := stage.get("reason")):
         say(f"The stage of the clearance was chosen. {reason}.")
     certificate = answer["certificate"]
     say(
@@ -112,14 +130,14 @@ def synthesised(answer: Mapping[str, Any]) -> None:
         )
 
 
-def _base(knob: Mapping[str, Any]) -> dict[str, str]:
+def _base(knob: KnobRow) -> dict[str, str]:
     """The base's acceleration per volt of the channel that stands for it, where it moves."""
     if "base_m_s2_per_v" not in knob:
         return {}
     return {"base per volt": acceleration_text(knob["base_m_s2_per_v"])}
 
 
-def _second_channel(knob: Mapping[str, Any]) -> dict[str, str]:
+def _second_channel(knob: KnobRow) -> dict[str, str]:
     """Amplitude and phase of the generator's second channel, where there is one."""
     if "second" not in knob:
         return {}
@@ -128,9 +146,9 @@ def _second_channel(knob: Mapping[str, Any]) -> dict[str, str]:
     return {"second channel (peak)": f"{second['amplitude_v_peak']:.4g} V{phase}"}
 
 
-def tolerance(answer: Mapping[str, Any]) -> None:
+def tolerance(answer: StudyAnswer | RunAnswer) -> None:
     """The responses on each engine, and their yields."""
-    spread = (answer.get("provenance", {}).get("spread") or {}).get("name", "")
+    spread = (answer["provenance"]["spread"] or {}).get("name", "")
     of_file = f", spread of the {spread}" if spread == "model file" else ""
     rows = answer["responses"]
     table(
@@ -147,49 +165,47 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         ),
         gap=1,
     )
-    if answer.get("boards"):
-        _boards(answer)
+    if boards := answer.get("boards"):
+        _boards(boards, [_head(r) for r in rows])
     for r in rows:
         for line in untrusted(_trust_with_figures(r)):
             say(f"{drive_text(r['omega'], r.get('frequency_hz'), 6)}: {line}")
-    if answer.get("equation_check") is not None:
+    if (equations := answer.get("equation_check")) is not None:
         from designer.spice.equation_check import EquationCheck
 
-        problem = EquationCheck.read(answer["equation_check"]).problem
+        problem = EquationCheck.read(equations).problem
         if problem:
             say(problem)
     attribution_status(answer)
-    if answer.get("until") is not None:
+    if (until := answer.get("until")) is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
-        say(f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
+        say(f"Intervals narrower than {100 * until:g} % of boards: {reached}")
     _further(answer)
     _rare(answer)
 
 
-def _counts(row: Mapping[str, Any]) -> dict[str, str]:
+def _counts(row: StudyResponse) -> dict[str, str]:
     """The yield of a response; of one that was left out, why."""
     y = row["yield"]
     if y is None:
         counted = ["-", row.get("left_out", ""), "", "", ""]
     else:
-        lost = [str(y[k]) for k in ("lost", "grazing", "failed")]
+        lost = [str(y["lost"]), str(y["grazing"]), str(y["failed"])]
         counted = [_percent(row["rate"]), _interval(y, y), *lost]
     return dict(zip(("yield %", "95 %", "lost", "grazing", "failed"), counted, strict=True))
 
 
-def _boards(answer: Mapping[str, Any]) -> None:
+def _boards(boards: Sequence[MeasuredBoard], heads: Sequence[str]) -> None:
     """One row for each measured board, where the study is of all of them."""
-    boards = answer["boards"]
-    heads = [_head(r) for r in answer["responses"]]
     rows = ([b["board"], *(cell or "-" for cell in b["cells"]), b["all"] or "-"] for b in boards)
     grid(f"All {len(boards)} boards", ["board", *heads, "all of them"], rows, gap=1)
 
 
-def attribution_status(answer: Mapping[str, Any]) -> None:
+def attribution_status(answer: StudyKeys) -> None:
     """One line about an attribution that is not whole, or whose indices an earlier version stored
     without their noise; none else."""
-    status = answer.get("blame") or {}
-    if status.get("reason"):
+    status = answer.get("blame")
+    if status is not None and status["reason"]:
         say(f"Blame {status['status']}: {status['reason']}")
     if lacks_noise(answer):
         say(
@@ -198,12 +214,12 @@ def attribution_status(answer: Mapping[str, Any]) -> None:
         )
 
 
-def _further(answer: Mapping[str, Any]) -> None:
+def _further(answer: StudyKeys) -> None:
     """The yields beside those as built, where there are any."""
     rows = answer["responses"]
-    kinds: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+    kinds: dict[str, Callable[[StudyResponse], RatedCounts | None]] = {
         "tuned %": lambda r: r.get("tuned"),
-        "on the bench %": lambda r: (r.get("tuned") or {}).get("bench"),
+        "on the bench %": lambda r: None if (t := r.get("tuned")) is None else t["bench"],
         "trimmed %": lambda r: r.get("trimmed"),
         "reached %": lambda r: r.get("reached"),
     }
@@ -216,32 +232,35 @@ def _further(answer: Mapping[str, Any]) -> None:
         (
             {
                 **response_cells(r, rows),
-                **{kind: _decided(of(r) or {}) for kind, of in kinds_present.items()},
+                **{kind: _decided(of(r)) for kind, of in kinds_present.items()},
                 **(_both_engines(r) if both else {}),
             }
             for r in rows
         ),
         gap=1,
     )
-    joint = answer.get("all_on_one_board") or {}
-    counts = [
-        f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
-        for kind, y in joint.items()
-        if y is not None
-    ]
+    joint = answer.get("all_on_one_board")
+    if joint is None:
+        return
+    kinds_joint = {
+        "as built": joint["built"],
+        "tuned": joint["tuned"],
+        "trimmed": joint["trimmed"],
+        "reached": joint["reached"],
+    }
+    counts = [f"{kind} {y['ok']} of {y['samples']}" for kind, y in kinds_joint.items() if y]
     if counts:
         say(f"All on one board: {', '.join(counts)}")
 
 
-def _rare(answer: Mapping[str, Any]) -> None:
+def _rare(answer: StudyKeys) -> None:
     """How many of a million boards are lost, where that was asked for."""
-    rows = answer.get("responses", ())
-    asked = [r for r in rows if r.get("rare")]
+    rows = answer["responses"]
+    asked = [(r, found) for r in rows if (found := r.get("rare"))]
     if not asked:
         return
 
-    def cells(row: Mapping[str, Any]) -> dict[str, str]:
-        found = row["rare"]
+    def cells(found: RareLossKeys) -> dict[str, str]:
         estimate, low, high = map(boards_text, found["per_million"])
         regions = [f"{g['becomes']} ({g['found_by']}) {share_text(g['share'])}" for g in
                    found["regions"]]  # fmt: skip
@@ -254,22 +273,23 @@ def _rare(answer: Mapping[str, Any]) -> None:
             "first loss at": "-" if wide is None else f"{wide:.2g} × the tolerances",
         }
 
-    table("Rare losses", ({**response_cells(r, rows), **cells(r)} for r in asked), gap=1)
+    shown = ({**response_cells(r, rows), **cells(found)} for r, found in asked)
+    table("Rare losses", shown, gap=1)
     if any_lost := answer.get("any_lost"):
         say(any_lost_words(any_lost))
-    unseen = max(r["rare"]["unseen"] for r in asked)
+    unseen = max(found["unseen"] for _, found in asked)
     if unseen:
         more = boards_text(1e6 * unseen)
         say(f"A region of losses that no search met may hold up to {more} of a million more")
 
 
-def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:
-    both, cells = row.get("combined"), ["-", "", ""]
-    if both is not None:
+def _both_engines(row: StudyResponse) -> dict[str, str]:
+    both, counted, cells = row.get("combined"), row["yield"], ["-", "", ""]
+    if both is not None and counted is not None:
         differ = both["disagreement"]
         cells = [
             _percent(both["estimate"]),
-            _interval(both, row["yield"]),
+            _interval(both, counted),
             f"{differ['count']} of {differ['asked']}",
         ]
     return dict(zip(("both engines %", "95 %", "differ"), cells, strict=True))
@@ -287,7 +307,7 @@ def files(folder: Path, reused: bool) -> None:
     say(f"{folder}: {how}")
 
 
-def untrusted(trust: Mapping[str, Any]) -> list[str]:
+def untrusted(trust: Mapping[str, TrustVerdict | None]) -> list[str]:
     """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
     results = {quantity: result for quantity, result in trust.items() if result is not None}
     return [
@@ -301,11 +321,11 @@ def untrusted(trust: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
+def _trust_with_figures(row: StudyResponse) -> dict[str, TrustVerdict | None]:
     """The trust of a study's response; ngspice's with the reason that has the figures."""
-    trust = dict(row.get("trust") or {})
-    if trust.get("ngspice") is not None and row.get("ngspice_reason"):
-        trust["ngspice"] = {**trust["ngspice"], "reasons": [row["ngspice_reason"]]}
+    trust = dict(row.get("trust", {}))
+    if (ngspice := trust.get("ngspice")) is not None and row["ngspice_reason"]:
+        trust["ngspice"] = {**ngspice, "reasons": [row["ngspice_reason"]]}
     return trust
 
 
@@ -327,7 +347,7 @@ def drive_cells(
     return {"ω": f"{row['omega']:g}", **mechanism}
 
 
-def _head(row: Mapping[str, Any]) -> str:
+def _head(row: StudyResponse) -> str:
     """A response above a column: its frequency and the wanted n-p-q."""
     place = drive_text(row["omega"], row.get("frequency_hz"), 6).removeprefix("ω = ")
     return f"{place} {row['expected'] or '-'}"
@@ -340,7 +360,7 @@ def _mechanism(
     return {"mechanism": value_text(row[key], "Hz")} if all(key in r for r in rows) else {}
 
 
-def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
+def _interval(ends: IntervalRow, counted: YieldCounts) -> str:
     """The interval of a share in per cent; where all boards there are were asked, which leaves
     none, their number."""
     if counted.get("census") and ends["low"] == ends["high"]:
@@ -352,10 +372,12 @@ def _percent(rate: float | None) -> str:
     return "-" if rate is None else f"{100 * rate:.1f}"
 
 
-def _decided(counted: Mapping[str, Any]) -> str:
+def _decided(counted: RatedCounts | None) -> str:
     """A yield, and how many boards had no answer, if any."""
-    failed = counted.get("failed")
-    return _percent(counted.get("rate")) + (f" ({failed} failed)" if failed else "")
+    if counted is None:
+        return _percent(None)
+    failed = counted["failed"]
+    return _percent(counted["rate"]) + (f" ({failed} failed)" if failed else "")
 
 
 def _error(value: float) -> str:

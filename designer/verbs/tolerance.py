@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, cast
 
 from designer.base.defaults import Over, StudyEngine
 from designer.base.errors import InputError
@@ -27,6 +27,7 @@ from designer.verbs.declared import (
 )
 
 if TYPE_CHECKING:
+    from designer.answers.study_answer import RunAnswer, StudyAnswer
     from designer.check.synthesis_result import Synthesis
     from designer.jobs.job_outcome import JobOutcome
     from designer.model.model_file import ModelFile
@@ -152,18 +153,17 @@ def tolerance(
     return measured_into(path, Path(measured), options, progress, command, shown)
 
 
-def printed(result: JobOutcome) -> dict[str, Any]:
+def printed(result: JobOutcome) -> StudyAnswer:
     """The part of the answer that is of the study."""
-    answer: Mapping[str, Any] = result.answer
-    return {
-        **{key: answer[key] for key in STUDY_KEYS if key in answer},
-        "cost": answer["cost"]["study"],
-    }
+    answer: RunAnswer = result.answer
+    own = {key: answer.get(key) for key in STUDY_KEYS if key in answer}
+    return cast("StudyAnswer", {**own, "cost": answer["cost"]["study"]})
 
 
 def show(result: JobOutcome) -> None:
     """The tables, where the files are, and what may be done next."""
-    tables.design_written(result, printed(result), tables.tolerance, next_steps.after_study)
+    shown = tables.worked_out_last if result.shown else tables.tolerance
+    tables.design_written(result, printed(result), shown, next_steps.after_study)
 
 
 VERB = Verb(

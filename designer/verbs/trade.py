@@ -16,6 +16,7 @@ from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Sourc
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.trade_answer import TradeAnswer
     from designer.model.model_file import ModelFile
 
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 class TradeResult:
     """What the verb ``trade`` answers."""
 
-    answer: dict[str, Any]
+    answer: TradeAnswer
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""

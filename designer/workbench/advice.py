@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import qmc
@@ -31,6 +31,9 @@ from designer.workbench.board_fit import BoardFit
 from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset, widths
 from designer.yields.setting_search import BoardCase, seek
 from designer.yields.window_path import find_window
+
+if TYPE_CHECKING:
+    from designer.answers.bench_answer import AdviceRow
 
 SAMPLES = 40
 """Boards that a setting is asked of."""
@@ -98,7 +101,7 @@ class Advice:
             return f"no setting helps; exact, this part would: {named}"
         return "no setting and no single part helps"
 
-    def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
+    def as_dict(self, si: SiScales | None = None) -> AdviceRow:
         """The advice as a JSON answer has it."""
         to = self.excitation
         return {

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import DesignerError
+from designer.base.plain_json import plain
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_modes import BoardModes
 from designer.circuit.board_values import nominal_board
@@ -28,6 +29,9 @@ from designer.workbench.free_decay import FreeDecay, resonances
 from designer.workbench.naming import NamedMotion
 from designer.workbench.observation import Observation, observe
 from designer.workbench.prediction import BoardPrediction, PredictedResponse
+
+if TYPE_CHECKING:
+    from designer.answers.bench_answer import BoardRecord
 
 DETERMINED = 0.5
 """The widest interval of a figure that the records determine, over the interval of the spread."""
@@ -199,12 +203,12 @@ class FittedBoard:
         """The misfit of the worst record; see ``BoardFit.misfits``."""
         return None if self.fit is None else max(self.fit.misfits)
 
-    def as_dict(self, si: SiScales | None = None) -> dict[str, Any]:
+    def as_dict(self, si: SiScales | None = None) -> BoardRecord:
         """The board as a JSON answer has it. The residual is that of the worst record."""
         return {
             "board": self.name,
             "files": list(self.files),
-            "figures": self.figures,
+            "figures": plain(self.figures),
             "misfit": self.misfit,
             "doubtful": self.misfit is not None and self.misfit > DOUBTFUL,
             "residual": None if self.fit is None else max(self.fit.residuals),

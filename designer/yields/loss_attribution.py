@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.plain_json import plain
 from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict
@@ -22,6 +22,9 @@ from designer.yields.loss_replay import KEPT, LOST, PartAttribution, extent_of, 
 from designer.yields.margins import Margin, Prediction
 from designer.yields.stored_parts import StoredParts
 from designer.yields.worst_corner import Corner, Index, sobol, worst_corners
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import AttributionRows, AttributionStatusRow
 
 SHOWN_LIMITS = 4
 NOTHING_LOST = "no board was lost, so none was replayed"
@@ -93,7 +96,7 @@ class Attribution:
         made = (index for response in self.responses for index in response.indices)
         return all(math.isfinite(i.total_error) for i in made if math.isfinite(i.total))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> AttributionRows:
         """The attribution as plain data for JSON; an undefined number is None."""
         rows = []
         for r in self.responses:
@@ -104,7 +107,7 @@ class Attribution:
             rows.append(row)
         cost = {"attractors": self.attractors, "orbits": self.orbits, "seconds": self.seconds}
         out = {"samples": self.samples, "seed": self.seed, "responses": rows, "cost": cost}
-        document: dict[str, Any] = plain(out)
+        document: AttributionRows = plain(out)
         return document
 
 
@@ -282,7 +285,7 @@ class AttributionStatus:
             return f"Blame, in part: {self.reason}."
         return f"Blame {self.stage}: {self.reason}."
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> AttributionStatusRow:
         """The status as plain data for JSON."""
         return {
             "status": str(self.stage),

@@ -12,17 +12,17 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 from zlib import crc32
 
 import numpy as np
 from scipy.special import ndtri
 
+from designer.answers.rare_words import boards_text
 from designer.base.arrays import Array
 from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import inverse_binomial, wilson
-from designer.base.rare_words import boards_text
 from designer.spread.tilted_cube import TiltedCube
 from designer.verdicts.verdict import StudyPlan
 from designer.yields.drawn_boards import BLOCK, Drawing, Sample
@@ -36,6 +36,9 @@ from designer.yields.loss_regions import (
 from designer.yields.stored_parts import AnswerLog, StoredParts
 from designer.yields.worst_corner import LAST
 from designer.yields.yield_count import Yield
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import RareLossRow
 
 MOST_BOARDS = 40_000
 """Boards that the estimate may take, pilot rounds left out."""
@@ -158,9 +161,9 @@ class RareLosses:
         spread = (self.lost / self.low) ** (quantile / QUANTILE)
         return self.lost / spread, min(self.lost * spread, 1.0)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> RareLossRow:
         """Plain data for JSON; an undefined number is None."""
-        document: dict[str, Any] = plain({**asdict(self), "per_million": self.per_million})
+        document: RareLossRow = plain({**asdict(self), "per_million": self.per_million})
         return document
 
 

@@ -10,11 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING
 
 from designer.base.si_unit import value_text
 from designer.circuit.netlist import Excitation
 from designer.dynamics.piecewise_linear import Drive
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import RecipeRow, SecondAmplitudes
 
 SLOWER = 10
 """How many times slower than it says a recipe is tried as well."""
@@ -172,27 +175,34 @@ class Recipe:
             return f"{text} (omega {omega:.4g})"
         return f"{text} ({value_text(omega * self.hertz_scale, 'Hz')} of the mechanism)"
 
-    def _second(self) -> dict[str, float]:
-        """The amplitudes of the second channel, where there is one."""
-        ends = {"amplitude2_v_peak": self.first, "to_amplitude2_v_peak": self.target}
-        return {name: at.second.amplitude for name, at in ends.items() if at.second is not None}
-
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> RecipeRow:
         """For JSON: settings in Hz and V, times in drive periods and seconds."""
-        counts = ("reached", "trials", "board_reached", "board_trials", "boards", "able")
+        second: SecondAmplitudes = {}
+        if self.first.second is not None:
+            second["amplitude2_v_peak"] = self.first.second.amplitude
+        if self.target.second is not None:
+            second["to_amplitude2_v_peak"] = self.target.second.amplitude
         return {
             "way": str(self.way),
             "frequency_hz": self.first.frequency,
             "amplitude_v_peak": self.first.amplitude,
             "to_frequency_hz": self.target.frequency,
             "to_amplitude_v_peak": self.target.amplitude,
-            **self._second(),
+            **second,
             "steps": self.steps,
             "hold_periods": self.hold,
             "wait_periods": self.wait,
             "sweep_seconds": self.sweep_seconds,
             "wait_seconds": self.wait_seconds,
-            **{name: getattr(self, name) for name in (*counts, "smooth", "slower", "text")},
+            "reached": self.reached,
+            "trials": self.trials,
+            "board_reached": self.board_reached,
+            "board_trials": self.board_trials,
+            "boards": self.boards,
+            "able": self.able,
+            "smooth": self.smooth,
+            "slower": self.slower,
+            "text": self.text,
         }
 
 

@@ -33,6 +33,7 @@ from designer.yields.yield_maps import YieldMap
 if TYPE_CHECKING:
     import pandas as pd
 
+    from designer.answers.shared_rows import ProvenanceRow
     from designer.yields.row_store import Row
 
 BOARD_COLUMNS = tuple(
@@ -221,7 +222,7 @@ class RunResult:
     """The wanted responses on all engines."""
     study: Study
     """The tolerance study."""
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: ProvenanceRow
     """Versions, seed and settings."""
     cost: dict[str, float] = field(default_factory=dict)
     """Wall times [s] by stage."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from designer.base.proportion import wilson
 from designer.verdicts.verdict import Verdict
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import CountKeys
 
 WORST_FIRST = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
 """What decides for a board: one response lost is one too many, whatever the others are."""
@@ -47,9 +50,15 @@ class Yield:
         return wilson(self.ok, decided)
 
     @property
-    def counts(self) -> dict[str, int]:
+    def counts(self) -> CountKeys:
         """The counts by the keys of the contract."""
-        return {name: getattr(self, name) for name in "ok lost grazing failed samples".split()}
+        return {
+            "ok": self.ok,
+            "lost": self.lost,
+            "grazing": self.grazing,
+            "failed": self.failed,
+            "samples": self.samples,
+        }
 
 
 class JudgedSample(Protocol):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -219,7 +220,7 @@ def test_a_domain_narrower_than_a_thousandth_hides_no_mirror_of_one_value_alone(
 
 def test_a_grazing_curve_goes_through_equal_gaps() -> None:
     """Each stop is touched where the response without one is as large as its gap."""
-    found = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))
+    found: Any = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))
 
     def free(w: float, gap: float) -> float:
         return math.hypot(1.0 - w * w, 0.1 * w) - 1.0 / gap

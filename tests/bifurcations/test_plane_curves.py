@@ -3,8 +3,11 @@ independent integrator."""
 
 from __future__ import annotations
 
+import threading
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from designer.base.arrays import Array
+from designer.base.threads import parallel
 from designer.bifurcations.border_curve import BorderCurve, read_curve
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.conditions import (
@@ -24,7 +28,7 @@ from designer.bifurcations.conditions import (
 )
 from designer.bifurcations.continuation import start, trace
 from designer.bifurcations.extended_system import CurvePoint
-from designer.bifurcations.flow_family import Family, FlowPlane
+from designer.bifurcations.flow_family import MOST_FLOWS, Family, FlowPlane
 from designer.bifurcations.grazing_contact import GrazingContact
 from designer.bifurcations.orbit_curve import map_image
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
@@ -100,6 +104,26 @@ def test_torus_curve_and_its_resonances_where_damping_vanishes() -> None:
     assert np.abs(followed.values[:, 0]).max() < 1e-9
     met = {c.name: c.values[1] for c in followed.codimension_two}
     assert met == pytest.approx({"1:3 resonance": 3.0, "1:4 resonance": 4.0}, abs=1e-8)
+
+
+def test_two_threads_do_not_drop_the_same_flow() -> None:
+    """The rays of a region ask at once; here both threads are about to drop the oldest flow."""
+    both = threading.Barrier(2)
+
+    class Meeting(dict[Any, Any]):
+        def pop(self, *key: Any) -> Any:
+            with suppress(threading.BrokenBarrierError):
+                both.wait(0.5)
+            return super().pop(*key)
+
+    def build(*at: float) -> Any:
+        return at
+
+    along = Family("a", 0.0, 1e9, build)
+    known = Meeting({(0.0, float(k)): () for k in range(MOST_FLOWS)})
+    plane = FlowPlane(along, along, build, known)
+    places = [(1.0, 0.0), (2.0, 0.0)]
+    assert list(parallel(lambda at: cast(Any, plane.flow(*at)), places, 2)) == places
 
 
 @pytest.mark.parametrize("kind", [PointKind.FOLD, PointKind.TORUS, PointKind.GRAZING])

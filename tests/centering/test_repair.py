@@ -69,6 +69,7 @@ from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared import bench_plans, paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
+from tests.shared.report_data import NO_ORIGIN
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -239,7 +240,7 @@ def test_a_rare_loss_is_repaired_for_the_least_price(monkeypatch: pytest.MonkeyP
     ]
     program = seen.program({(0, 0, 0): 1.0}, {})
     assert found.best.price == pytest.approx(min(program.price((*p, 0)) for p in enough))
-    assert "of a million lost" in text(repair_json(found, {}, 0.0))
+    assert "of a million lost" in text(repair_json(found, NO_ORIGIN, 0.0))
 
 
 @pytest.mark.slow
@@ -255,7 +256,7 @@ def test_the_cheapest_repair_is_the_enumerated_one(
     assert found.best.price == pytest.approx(by_hand(real))
     worst = [t.worst.rate for t in found.front]
     assert worst == sorted(worst)
-    told = text(repair_json(found, {}, 0.0))
+    told = text(repair_json(found, NO_ORIGIN, 0.0))
     assert "every response at 97 % or better" in told
     assert "ω = " in told
     assert to_svg(front_chart(found)).startswith("<svg")

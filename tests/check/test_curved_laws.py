@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from designer import bifurcation, simulate, synthesise
+from designer.answers.shared_rows import SpringMisfit
 from designer.base.arrays import Array
 from designer.explorer.place import read_place
 from designer.explorer.response_view import facts, reached as reached_at
@@ -39,7 +41,7 @@ def text(
     )
 
 
-def beyond(modelfile: ModelFile) -> list[dict[str, object]]:
+def beyond(modelfile: ModelFile) -> list[SpringMisfit]:
     (row,) = simulate(modelfile, starts=8).answer["responses"]
     return list(row.get("beyond_range", []))
 
@@ -58,7 +60,8 @@ def test_a_sweep_and_the_page_with_sliders_say_so_too(capsys: pytest.CaptureFixt
     """Of a window the step that goes furthest beyond the range."""
     modelfile = parse_model_file(text(1e-9, 0.9 * LINEAR))
     made = bifurcation(modelfile, from_=1.3, to=OMEGA, steps=3, points=False, jobs=1)
-    (window,) = made.answer["windows"]
+    answer: Any = made.answer
+    (window,) = answer["windows"]
     (spring,) = window["beyond_range"]
     reached = FORCE / math.hypot(1.0 - 1.3**2, DAMPING * 1.3)
     assert spring["reached"] == pytest.approx(reached, rel=1e-3)
@@ -78,7 +81,8 @@ def test_of_two_orbits_of_one_name_each_window_tells_its_own() -> None:
     made = bifurcation(
         modelfile, from_=1.0, to=1.6, steps=7, up=True, down=True, points=False, jobs=1
     )
-    down, up = made.answer["windows"]
+    answer: Any = made.answer
+    down, up = answer["windows"]
     assert (down["track"], up["track"]) == ("down", "up")
     assert (down["response"], down["symmetric"]) == (up["response"], up["symmetric"])
     assert up["beyond_range"][0]["reached"] > 1.0
@@ -112,7 +116,8 @@ def test_what_stays_inside_the_range_is_the_cube_s_motion(
     file = tmp_path / "narrow.toml"
     file.write_text(narrow, encoding="utf-8")
     made = simulate(file, starts=8)
-    (row,) = made.answer["responses"]
+    answer: Any = made.answer
+    (row,) = answer["responses"]
     assert abs(row["x1_max"] / peak - 1.0) > 0.04
     (spring,) = row["beyond_range"]
     assert spring["reached"] == pytest.approx(row["x1_max"], rel=1e-3)
@@ -125,7 +130,8 @@ def test_a_motion_over_few_pieces_is_told(capsys: pytest.CaptureFixture[str]) ->
     """The error that a file states counts against the force at the end of the range."""
     peak = peak_of(1.0)
     made = simulate(parse_model_file(text(1.0, 6.0)), starts=8)
-    (row,) = made.answer["responses"]
+    answer: Any = made.answer
+    (row,) = answer["responses"]
     assert abs(row["x1_max"] / peak - 1.0) > 0.05
     assert "beyond_range" not in row
     (spring,) = row["coarse_range"]
@@ -151,7 +157,7 @@ def test_a_circuit_of_it_says_so_too(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert warning.startswith("At ω = 1.4 the response 1-0-0 draws the cubic spring")
     (row,) = simulate(tmp_path / "made", engine="circuit", starts=8).answer["responses"]
     assert row["beyond_range"][0]["range"] == pytest.approx(0.9)
-    swept = bifurcation(
+    swept: Any = bifurcation(
         tmp_path / "made", circuit=True, over="omega", from_=1.4, to=1.41, steps=2, points=False
     )
     (window,) = swept.answer["windows"]
@@ -202,7 +208,7 @@ def test_stops_that_are_not_laid_for_the_motion_are_told(
     depth: float, key: str, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     peak = peak_on_a_ball()
-    answer = simulate(parse_model_file(on_a_ball(depth)), starts=8).answer
+    answer: Any = simulate(parse_model_file(on_a_ball(depth)), starts=8).answer
     (row,) = answer["responses"]
     assert abs(row["x1_max"] / peak - 1.0) > 0.02
     (stops,) = row[key]

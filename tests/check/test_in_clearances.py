@@ -36,7 +36,7 @@ POINTS = 8000
 """In the motion that is looked at, here."""
 
 
-def followed(system: Mechanism, row: dict[str, Any], periods: int) -> list[tuple[Any, Any]]:
+def followed(system: Mechanism, row: Any, periods: int) -> list[tuple[Any, Any]]:
     """(displacements, speeds at entries by side) in each clearance, from the start of a response.
     The stops have no dampers, so that the force is the same on both sides of an entry."""
     n, start = len(system.masses), np.array(row["start"])
@@ -71,7 +71,7 @@ def test_depths_and_speeds_are_those_of_the_motion(
 ) -> None:
     path = tmp_path / "it.toml"
     path.write_text(text + table("response", frequency=f"{hertz} Hz"), encoding="utf-8")
-    answer = simulate(path, starts=0).answer
+    answer: Any = simulate(path, starts=0).answer
     (row,) = answer["responses"]
     system, _ = mechanism_of(path, row["omega"])
     truth = followed(system, row, row["n"])
@@ -108,7 +108,8 @@ def test_without_a_period_it_is_what_many_periods_show() -> None:
         table("force", on="m1", amplitude=1.0),
     )
     made = simulate(parse_model_file(text), 1.25, starts=0)
-    (row,) = made.answer["responses"]
+    answer: Any = made.answer
+    (row,) = answer["responses"]
     assert row["impacts"] == []
     (each,) = row["in_clearances"]
     motion = made[0].motion(np.linspace(0.0, 200 * 2.0 * math.pi / 1.25, 40_000))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,7 +98,7 @@ def test_phases_come_to_those_of_coulomb_s_law(
     text = block(omega, force, velocity, mass, **more)
     (row,) = simulate(parse_model_file(text), starts=0).answer["responses"]
     assert (row["response"], row["n"]) == ("1-0-0", 1)
-    (held,) = row["sticking"]
+    (held,) = row["sticking"] or ()
     assert held["friction"] == "block-ground.friction"
     assert (held["periods"], held["phases"]) == (1, phases)
     assert held["share"] == pytest.approx(share, abs=0.01)
@@ -120,7 +121,7 @@ def test_of_two_bodies_it_is_where_they_move_together() -> None:
     which is flat there."""
     made = simulate(parse_model_file(TWO), starts=0)
     (row,) = made.answer["responses"]
-    (held,) = row["sticking"]
+    (held,) = row["sticking"] or ()
     period = 2.0 * math.pi / 0.5
     grid = np.linspace(0.0, row["n"] * period, 20_001)
     states = made[0].motion(grid)
@@ -134,9 +135,9 @@ def test_of_two_bodies_it_is_where_they_move_together() -> None:
 
 def test_with_half_the_clearance_forces_and_velocities_are_half() -> None:
     text = block(0.3, 0.4, 0.008)
-    halved = simulate(parse_model_file(text + "b = 0.5\n"), starts=0).answer
+    halved: Any = simulate(parse_model_file(text + "b = 0.5\n"), starts=0).answer
     plain = block(0.3, 0.2, 0.004)
-    whole = simulate(parse_model_file(plain), starts=0).answer
+    whole: Any = simulate(parse_model_file(plain), starts=0).answer
     (one,), (other,) = halved["responses"][0]["sticking"], whole["responses"][0]["sticking"]
     assert one["phases"] == other["phases"] == 2
     assert one["share"] == pytest.approx(other["share"], abs=0.002)
@@ -151,7 +152,7 @@ def test_on_the_circuit_it_is_as_on_the_model() -> None:
         for engine in ("model", "circuit")
     )
     for one, other in zip(model, circuit, strict=True):
-        (held,), (on_board,) = one["sticking"], other["sticking"]
+        (held,), (on_board,) = one["sticking"] or (), other["sticking"] or ()
         assert on_board["phases"] == held["phases"]
         assert on_board["share"] == pytest.approx(held["share"], abs=0.01)
         assert on_board["creep"] == pytest.approx(held["creep"], rel=0.1)
@@ -161,13 +162,13 @@ def test_a_block_that_is_never_moved_holds_always(capsys: pytest.CaptureFixture[
     """And one on a belt that is faster than itself never does; both are told."""
     still = block(0.3, 1.5, 0.004)
     answer = simulate(parse_model_file(still), starts=0).answer
-    (held,) = answer["responses"][0]["sticking"]
+    (held,) = answer["responses"][0]["sticking"] or ()
     assert (held["phases"], held["share"], held["longest"]) == (0, 1.0, 1.0)
     tables(answer)
     assert "always" in capsys.readouterr().err
     belt = block(0.3, 0.2, 0.004, damping=0.1, speed=9.0)
     answer = simulate(parse_model_file(belt), starts=0).answer
-    (held,) = answer["responses"][0]["sticking"]
+    (held,) = answer["responses"][0]["sticking"] or ()
     assert (held["phases"], held["share"], held["longest"]) == (0, 0.0, 0.0)
     tables(answer)
     assert "never" in capsys.readouterr().err
@@ -176,4 +177,4 @@ def test_a_block_that_is_never_moved_holds_always(capsys: pytest.CaptureFixture[
 def test_the_example_sticks_twice_and_slides_on() -> None:
     file = Path(__file__).parents[2] / "examples" / "dry-friction.toml"
     rows = simulate(file, starts=0).answer["responses"]
-    assert [row["sticking"][0]["phases"] for row in rows] == [2, 0]
+    assert [held["phases"] for row in rows for held in row["sticking"] or ()] == [2, 0]

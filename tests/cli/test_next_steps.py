@@ -41,19 +41,23 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_after_a_study_what_has_cause_is_proposed(folder: Path) -> None:
-    good = {"responses": [response()]}
+    good: Any = {"responses": [response()]}
     assert verbs(next_steps.after_study(folder, good)) == ["rules", "export"]
-    poor = {"responses": [response(rate=0.5)]}
+    poor: Any = {"responses": [response(rate=0.5)]}
     assert verbs(next_steps.after_study(folder, poor))[0] == "search"
-    left_out = {"responses": [response(found=False) | {"yield": None, "rate": None}]}
+    unanswered: Any = {"responses": [response() | {"rate": None}]}
+    assert verbs(next_steps.after_study(folder, unanswered))[0] == "search"
+    left_out: Any = {"responses": [response(found=False) | {"yield": None, "rate": None}]}
     assert verbs(next_steps.after_study(folder, left_out))[0] == "bifurcation"
     (folder / "kicad" / "rig.kicad_pcb").unlink()
     assert verbs(next_steps.after_study(folder, good)) == ["export"]
 
 
 def test_the_board_s_rules_are_proposed_once(folder: Path) -> None:
-    assert verbs(next_steps.after_rules(folder, {"board": None})) == ["rules"]
-    assert verbs(next_steps.after_rules(folder, {"board": "rig.kicad_pcb"})) == []
+    without: Any = {"board": None}
+    assert verbs(next_steps.after_rules(folder, without)) == ["rules"]
+    on_board: Any = {"board": "rig.kicad_pcb"}
+    assert verbs(next_steps.after_rules(folder, on_board)) == []
 
 
 def test_a_model_in_hertz_is_swept_in_hertz(tmp_path: Path) -> None:
@@ -74,18 +78,17 @@ def test_a_sweep_goes_around_the_frequency_that_was_wanted(tmp_path: Path) -> No
 
 
 def test_a_design_or_a_model_leads_on(tmp_path: Path) -> None:
-    assert verbs(next_steps.after_design(tmp_path, {"knobs": [response()]})) == [
-        "tolerance",
-        "rules",
-    ]
+    design: Any = {"knobs": [response()]}
+    assert verbs(next_steps.after_design(tmp_path, design)) == ["tolerance", "rules"]
     assert verbs(next_steps.after_model(tmp_path / "my.toml")) == ["simulate", "run"]
 
 
 def test_rules_that_fail_are_proposed_first(tmp_path: Path) -> None:
     """And once: rules without a board say nothing else."""
     failing = {"failed_rules": [{"id": "swing"}, {"id": "offset-force"}]}
-    steps = list(next_steps.after_design(tmp_path, {"knobs": [response()], **failing}))
+    design: Any = {"knobs": [response()], **failing}
+    steps = list(next_steps.after_design(tmp_path, design))
     assert verbs(steps) == ["rules", "tolerance"]
     assert steps[0][1].endswith("swing, offset-force")
-    study = {"responses": [response()], **failing}
+    study: Any = {"responses": [response()], **failing}
     assert verbs(next_steps.after_study(tmp_path, study)) == ["rules", "export"]

@@ -10,7 +10,7 @@ from designer.jobs.bifurcation_job import BifurcationResult
 from designer.verbs import bifurcation, rules, simulate, tables
 
 
-def answer(**more: Any) -> dict[str, Any]:
+def answer(**more: Any) -> Any:
     return {"samples": 7, "responses": [], "provenance": {"spread": {"name": "bench-1"}}, **more}
 
 
@@ -27,7 +27,8 @@ def test_noise_that_an_earlier_version_did_not_store_is_said_once(
 ) -> None:
     indices = [{"first": 0.1, "total": 0.2, **noise}, {"first": None, "total": None}]
     response = {"blame": {"indices": indices}}
-    tables.attribution_status({"blame": {"reason": ""}, "responses": [response, response]})
+    study: Any = {"blame": {"reason": ""}, "responses": [response, response]}
+    tables.attribution_status(study)
     assert capsys.readouterr().err.count("--blame --resume") == said
 
 
@@ -55,7 +56,7 @@ def test_attractors_of_one_name_are_told_apart_by_how_far_they_go() -> None:
             **reach,
         }
 
-    starts = {
+    starts: Any = {
         "attractors": [
             attractor("1-1-0", (-0.31, 0.52), 0.25),
             attractor("1-1-0", (-1.2, 0.9), 0.5),
@@ -101,7 +102,7 @@ def test_the_unit_that_was_asked_for_comes_first(
     window = {"track": "up", "from": 25.0, "to": 38.0, "from_hz": 3.9789, "to_hz": 6.0479}
     chaos = {"response": "aperiodic", "symmetric": None, "steps": 9}
     caption = "pitchfork of 1-1-1 symmetric at ω = 30.84298 rad/s: stable above"
-    sweep = {
+    sweep: Any = {
         "kind": "sweep",
         "unit": "rad/s",
         "si_unit": "Hz",
@@ -137,7 +138,7 @@ def test_families_and_narrow_windows_of_a_sweep_are_said_once(
         return {**place, "response": response, "family": family, **ends}
 
     def said(*windows: Any) -> list[str]:
-        sweep = {"kind": "sweep", "unit": "", "windows": windows, "points": []}
+        sweep: Any = {"kind": "sweep", "unit": "", "windows": windows, "points": []}
         result = BifurcationResult(sweep, False, None, ("", ""), cast(Any, None))
         bifurcation.show(result)
         return capsys.readouterr().err.splitlines()
@@ -164,12 +165,13 @@ def test_the_figure_of_a_design_rule_is_said(capsys: pytest.CaptureFixture[str])
         "limit": "at least 0 V",
         "reason": None,
     }
-    rules.tables({"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}})
+    judged: Any = {"rules": [row], "counts": {"pass": 1, "fail": 0, "not run": 0}}
+    rules.tables(judged)
     assert "Room to the range's end 11 V at U1B" in " ".join(capsys.readouterr().err.split())
 
 
 def test_what_is_not_good_enough_is_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
-    design: dict[str, Any] = {
+    design: Any = {
         "parts": {"R1": 1e3},
         "max_error": 0.19,
         "certificate": {"status": "bound", "lower_bound": 0.0},

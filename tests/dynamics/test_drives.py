@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,8 +132,8 @@ def test_bifurcations_do_not_depend_on_the_phase_of_the_only_force(tmp_path: Pat
         more = {} if phase is None else {"phase": phase}
         path = tmp_path / f"{phase}.toml"
         path.write_text(one_mass(table("force", on="a", amplitude=0.45, **more)).text)
-        answer = designer.bifurcation(path, from_=0.5, to=1.5, steps=21, up=True)
-        points.append([(p["kind"], p["value"]) for p in answer.answer["points"]])
+        answer: Any = designer.bifurcation(path, from_=0.5, to=1.5, steps=21, up=True).answer
+        points.append([(p["kind"], p["value"]) for p in answer["points"]])
     assert [kind for kind, _ in points[0]] == [kind for kind, _ in points[1]]
     assert "grazing" in dict(points[0])
     np.testing.assert_allclose([v for _, v in points[0]], [v for _, v in points[1]], rtol=1e-6)

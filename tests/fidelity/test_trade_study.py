@@ -497,16 +497,16 @@ def test_yields_of_all_responses_name_those_that_were_not_asked() -> None:
     ]  # fmt: skip
 
 
-SETTINGS = {"trade": {"boards": 40}}
+ORIGIN: Any = {"seed": 1, "settings": {"trade": {"boards": 40}}}
 
 
-def document(found: Trade) -> dict[str, Any]:
-    return trade_json(found, {"seed": 1, "settings": SETTINGS}, 1.0, "a title")
+def document(found: Trade) -> Any:
+    return trade_json(found, ORIGIN, 1.0, "a title")
 
 
 def test_with_si_values_every_row_of_a_response_has_its_hertz() -> None:
     found = judged(*LADDER, boards=of_boards(40, 1, 0))
-    answer = trade_json(found, {"seed": 1, "settings": SETTINGS}, 1.0, "a title", SiScales())
+    answer: Any = trade_json(found, ORIGIN, 1.0, "a title", SiScales())
     rows = [r for k in ("rungs", "truths", "boards") for r in answer[k]]
     assert rows
     for row in rows:

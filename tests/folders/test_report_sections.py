@@ -19,8 +19,9 @@ from designer.base.plain_json import dumps
 from designer.fidelity import trade_files
 from designer.folders.report_sections import BENCHED, SHOWN, design_hash, renew_report
 from designer.report.page_html import render_page
-from designer.report.verb_sections import NEEDED, SECTIONS, is_whole
+from designer.report.verb_sections import SECTIONS, SHOWN as KINDS, is_whole
 from tests.shared.house import ROOT
+from tests.shared.typed_answers import needed
 
 STORED = Path(__file__).parents[1] / "jobs" / "folders" / "0.1.0" / "format-1.zip"
 TRADE = json.loads((ROOT / "reports/speed-accuracy/trade.json").read_text("utf-8"))
@@ -143,7 +144,8 @@ class _Read(dict[str, Any]):
 
     def get(self, key: str, default: Any = None) -> Any:
         self._free.add(key)
-        return super().get(key, default)
+        value = super().get(key, default)
+        return dict.copy(value) if isinstance(value, dict) else value
 
 
 def _reads(value: Any, keys: set[str], path: str) -> Any:
@@ -161,9 +163,9 @@ def test_what_a_section_reads_is_what_an_answer_has_to_have(verb: str, path: Pat
     for one in (answer, answer | {"reached": False}):
         SECTIONS[verb](_Read(one, keys), SHOWN[cast(StageName, verb)])
     inner = {key for key in keys if not any(k.startswith(f"{key}.") for k in keys)}
-    assert inner == set(NEEDED[verb])
+    assert inner == needed(KINDS[verb])
     assert is_whole(verb, answer)
-    for key in NEEDED[verb]:
+    for key in needed(KINDS[verb]):
         fewer = json.loads(json.dumps(answer))
         *above, last = key.split(".")
         for item in _items(fewer, above):
@@ -214,7 +216,7 @@ def test_records_of_boards_in_the_folder_are_shown_with_their_pages(path: Path) 
         (boards / name / BENCHED).write_text(dumps(answer), encoding="utf-8")
     (boards / "broken").mkdir()
     (boards / "broken" / BENCHED).write_text("{", encoding="utf-8")
-    for key in NEEDED["bench"]:
+    for key in needed(KINDS["bench"]):
         last = key.removeprefix("records.")
         (boards / f"without-{last}").mkdir()
         fewer = [{k: v for k, v in rows[0].items() if k != last}, rows[1]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,7 +79,10 @@ def test_files_are_read_back_as_the_same_design(
     folder.path.mkdir()
     for file, text in texts.items():
         (folder.path / file).write_text(text)
-    said = synthesis_json(first.modelfile, first.design, first.model_responses, {}, first.seconds)
+    no_origin: Any = {}
+    said: Any = synthesis_json(
+        first.modelfile, first.design, first.model_responses, no_origin, first.seconds
+    )
     (folder.path / "design.json").write_text(dumps(said))
     again = design_files.load(folder, first.modelfile, CATALOG)
     assert again.design.circuit == first.design.circuit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from designer.jobs import bench_job
 from designer.verbs.bench import bench, channels_of
 from designer.workbench import naming
 from tests.shared.paper_cases import synthesised
+from tests.shared.typed_answers import check_type
 from tests.workbench.stored_records import stored
 
 
@@ -47,7 +49,8 @@ def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path)
     assert (
         json.loads((out / "bench.json").read_text("utf-8"))["records"] == (result.answer["records"])
     )
-    sure, open_ = result.answer["records"]
+    answer: Any = result.answer
+    sure, open_ = answer["records"]
     assert (sure["response"], sure["sure"], sure["wanted"]) == ("1-2-2", True, "1-2-2")
     assert sure["as_wanted"] is True
     assert sure["omega"] == pytest.approx(0.85, rel=3e-4)
@@ -111,6 +114,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     for net in ("v1", "fv"):
         assert wave[net] == pytest.approx(exact[net], abs=0.02)
     assert result.answer["records"] == [record]
+    check_type(result.answer)
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
@@ -142,10 +146,12 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
         files.append(csv_of(number, tmp_path / name / "v1.csv"))
     out = tmp_path / "out"
     result = bench(folder, files, boards=True, out=out)
+    check_type(result.answer)
     first, second = result.answer["boards"]
     assert (first["board"], second["board"]) == ("A", "B")
     assert not first["doubtful"]
-    for board, record in zip((first, second), result.answer["records"], strict=True):
+    answer: Any = result.answer
+    for board, record in zip((first, second), answer["records"], strict=True):
         assert board["files"] == ["v1.csv"]
         assert record["fitted"] == board["figures"] != []
         for figure in board["figures"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -192,5 +193,5 @@ def test_a_model_file_s_list_is_studied_whole(tmp_path: Path) -> None:
 def test_columns_of_two_responses_at_one_frequency_differ() -> None:
     labels = response_labels([(0.85, "1-2-2"), (0.85, "1-2-2"), (1.5, None)])
     assert labels == ["1: 0.85 1-2-2", "2: 0.85 1-2-2", "3: 1.5 -"]
-    row = {"board": "B1", "cells": ["ok", None, "lost (clipped)"], "all": None}
+    row: Any = {"board": "B1", "cells": ["ok", None, "lost (clipped)"], "all": None}
     assert boards_csv(labels, [row]).splitlines()[1] == "B1,ok,,lost (clipped),"

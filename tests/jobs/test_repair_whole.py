@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import pytest
 
+from designer.answers.cure_answer import CureAnswer, CuredResponse
 from designer.base.design_folder import MODEL
 from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
@@ -25,6 +26,7 @@ from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.quick_folders import without_starts
+from tests.shared.typed_answers import check_type
 
 FRESH = Options(seed=4242, samples=400, rung="exact", blame=False)
 """Of the study by which a repair is judged."""
@@ -53,13 +55,13 @@ class Whole:
 
     design: Path
     repaired: Path
-    answer: dict[str, Any]
+    answer: CureAnswer
 
     @property
-    def told(self) -> dict[str, Any]:
+    def told(self) -> CuredResponse:
         """The one response, as the repair tells it."""
         (response,) = self.answer["responses"]
-        return cast(dict[str, Any], response)
+        return response
 
 
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
@@ -68,6 +70,7 @@ def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     synthesise_into(parse_model_file(model), design, Options(), Progress())
     found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
+    check_type(found.answer)
     return Whole(design, repaired, found.answer)
 
 

@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -457,7 +457,9 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
 
     # Another repair that does not come to a design: the old one is told of.
     if reached:
-        failed = CureResult({**answer["cure"], "reached": False, "why": "none"}, False, False)
+        failed = CureResult(
+            cast(Any, {**answer["cure"], "reached": False, "why": "none"}), False, False
+        )
         monkeypatch.setattr("designer.jobs.repair_job.repair_into", lambda *_, **__: failed)
         assert run("search", model, *options[:-1]) == 1
         assert "holds an earlier design" in capsys.readouterr().err
@@ -476,7 +478,8 @@ def test_both_designs_are_to_be_confirmed(
         search_job, "search_into", lambda *_: JobOutcome({}, found, tmp_path, reused=True)
     )
     monkeypatch.setattr(
-        "designer.jobs.repair_job.repair_into", lambda *_, **__: CureResult({}, True, True)
+        "designer.jobs.repair_job.repair_into",
+        lambda *_, **__: CureResult(cast(Any, {}), True, True),
     )
     monkeypatch.setattr(search_job, "confirmed_repair", lambda *_: (rows, stood))
     outcome = designer.search(parse_model_file(asked(OPEN)), tmp_path / "out", yield_=0.9)
@@ -497,7 +500,7 @@ def test_no_ngspice_is_said_before_a_repair_of_a_search_that_stands(
 
     def unreached(path: Path, **_: Any) -> CureResult:
         asks.append(path)
-        return CureResult({}, False, True)
+        return CureResult(cast(Any, {}), False, True)
 
     def stands(*_: Any) -> JobOutcome:
         return JobOutcome({}, True, folder.path, reused=True)
@@ -568,4 +571,5 @@ def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.M
 )
 def test_what_ngspice_bears_out(passed: bool | None, asked: int, agreed: int, held: bool) -> None:
     gate = None if passed is None else {"passed": passed}
-    assert confirms({"gate": gate, "asked": asked, "agreed": agreed}) is held
+    row: Any = {"gate": gate, "asked": asked, "agreed": agreed}
+    assert confirms(row) is held

@@ -50,7 +50,7 @@ from tests.shared.kicad_cases import case_files
 from tests.shared.mechanism_file import HAMMER
 from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
-from tests.shared.report_data import changed, plain_report
+from tests.shared.report_data import NO_ORIGIN, changed, plain_report
 
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}
@@ -675,7 +675,7 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     plan = plan_study(modelfile, design, (), catalog, samples=1, seed=1)
     study = Study(checked, plan, (), {0: "not asked"}, ())
     data = ReportData(
-        RunResult(modelfile, catalog, found, design, checked, study), "designer run x"
+        RunResult(modelfile, catalog, found, design, checked, study, NO_ORIGIN), "designer run x"
     )
     page = words_of(data)
     assert "The response was found" in page.text

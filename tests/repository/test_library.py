@@ -125,7 +125,8 @@ def test_a_table_and_an_answer_name_the_same_displacements() -> None:
     """Absolute ones, where the base moves and the equations count from it."""
     file = Path(__file__).parents[2] / "examples" / "hammer-base.toml"
     found = designer.simulate(file, frequency="54 Hz", starts=4)
-    (row,), table = found.answer["responses"], found.table()
+    answer: Any = found.answer
+    (row,), table = answer["responses"], found.table()
     assert row["base_amplitude"] > 0.0
     both = [row, *row["others"]]
     for kind in ("min", "max"):
@@ -190,6 +191,7 @@ def test_bifurcation(model: Path, tmp_path: Path) -> None:
     assert basins.diagram().query("quantity == 'none'").empty
     cells = basins.cells()
     assert cells[["x1", "x2"]].to_numpy().tolist() == [[x, y] for y in (-1, 1) for x in (-1, 1)]
+    assert basins.answer["kind"] == "basins"
     assert set(cells.attractor) == {a["number"] for a in basins.answer["attractors"]}
     assert "x1 and x2" in basins._repr_html_()
 

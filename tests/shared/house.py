@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HOUSE = ROOT / "designer"
 ORDER = (
     "base",
+    "answers",
     "kernels",
     "dynamics",
     "bifurcations",

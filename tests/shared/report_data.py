@@ -32,7 +32,13 @@ def paper_report(*responses: int) -> ReportData:
     plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
     answers = tuple(block(plan, range(3), 2))
     study = Study(checked, plan, tuple(range(len(found))), {}, answers)
-    return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
+    return ReportData(
+        RunResult(modelfile, made.catalog, found, design, checked, study, NO_ORIGIN), "designer"
+    )
+
+
+NO_ORIGIN: Any = {}
+"""The provenance of a study that is made up."""
 
 
 def changed(data: ReportData, **changes: Any) -> ReportData:

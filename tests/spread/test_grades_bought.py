@@ -42,6 +42,7 @@ from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.folders.test_stage_files import design_of
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
+from tests.shared.report_data import NO_ORIGIN
 from tests.shared.stages import bought as nearest_sold, rectifier, stage
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -146,7 +147,7 @@ def test_the_table_and_the_report_say_so(capfd: pytest.CaptureFixture[str]) -> N
         tables.synthesised(plain_json.plain(design_files.answer(made)))
         plan = plan_study(made.modelfile, made.design, (), made.catalog, samples=1, seed=1)
         study = Study((), plan, (), {}, ())
-        result = RunResult(made.modelfile, made.catalog, (), made.design, (), study)
+        result = RunResult(made.modelfile, made.catalog, (), made.design, (), study, NO_ORIGIN)
         page = " ".join(render_markdown(ReportData(result, "")).split())
         for said in (" ".join(capfd.readouterr().err.split()), page):
             assert ("drawn, at a better one: R50 R203 (1 % for 5 %)" in said) is there

@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -311,7 +312,8 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
     study = tolerance(fitted, samples=6, fidelity="exact", attributed=False, jobs=1)
     assert study.trimmed is not None
     assert len(study.trimmed) == 12
-    answer = study_json(study, {}, {})
+    no_origin: Any = {}
+    answer: Any = study_json(study, no_origin, {})
     for response in answer["responses"]:
         shown = response["trimmed"]
         assert shown["samples"] == 6
@@ -321,7 +323,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
     assert answer["all_on_one_board"]["trimmed"]["ok"] == whole.ok
     plain = tolerance(made, samples=2, fidelity="exact", attributed=False, jobs=1)
     assert plain.trimmed is None
-    assert study_json(plain, {}, {})["responses"][0]["trimmed"] is None
+    assert study_json(plain, no_origin, {})["responses"][0]["trimmed"] is None
 
 
 def test_the_setting_knows_no_response() -> None:

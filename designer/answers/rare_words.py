@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from designer.base.si_unit import celsius_text
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import AnyLostRow, RareLossKeys
 
 PARTS = 2
 """Parts of a region that are named."""
@@ -30,7 +33,7 @@ def _number(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def loss_words(rare: Mapping[str, Any]) -> str:
+def loss_words(rare: RareLossKeys) -> str:
     """How many boards of a million lose a response, what most of these show, and which parts lead
     there: of its ``rare``."""
     value, low, high = map(boards_text, rare["per_million"])
@@ -47,11 +50,11 @@ def loss_words(rare: Mapping[str, Any]) -> str:
     return text
 
 
-def any_lost_words(any_lost: Mapping[str, Any]) -> str:
+def any_lost_words(any_lost: AnyLostRow) -> str:
     """How many boards of a million lose one of several responses at least: a sentence without its
     full stop."""
-    keys = ("least", "most", "low", "high")
-    least, most, low, high = (boards_text(1e6 * any_lost[key]) for key in keys)
+    shares = any_lost["least"], any_lost["most"], any_lost["low"], any_lost["high"]
+    least, most, low, high = (boards_text(1e6 * share) for share in shares)
     return (
         f"At least one of the responses is lost on {least} to {most} of a million boards "
         f"({low} to {high} by the intervals and what may be unseen)"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from designer.base.rare_words import any_lost_words, boards_text, loss_words, share_text
+from designer.answers.rare_words import any_lost_words, boards_text, loss_words, share_text
 
 
 @pytest.mark.parametrize(
@@ -26,11 +28,12 @@ def test_a_share_has_no_exponent(share: float, text: str) -> None:
 
 def test_plenty_of_losses_are_said_in_whole_boards() -> None:
     region = {"becomes": "2-2-2", "share": 1.0, "parts": []}
-    rare = {"per_million": [2e5, 1.8e5, 2.234e5], "drawn_lost": 40, "regions": [region]}
-    assert loss_words({**rare, "margins": []}) == (
+    rare: Any = {"per_million": [2e5, 1.8e5, 2.234e5], "drawn_lost": 40, "regions": [region]}
+    rare["margins"] = []
+    assert loss_words(rare) == (
         "200000 of a million boards are lost (180000 to 223400), of them 100 %, which show 2-2-2"
     )
-    none = {"per_million": [0.0, 0.0, 1234.0], "drawn_lost": 0}
+    none: Any = {"per_million": [0.0, 0.0, 1234.0], "drawn_lost": 0}
     assert "at most 1234 of a million" in loss_words(none)
     joint = any_lost_words({"least": 0.2, "most": 0.3, "low": 0.1, "high": 1.0})
     assert "200000 to 300000 of a million boards (100000 to 1000000 by" in joint
