@@ -119,6 +119,7 @@ def test_grazing_on_a_moving_ground(omega: float, survives: bool) -> None:
     assert branch.points[-1].stable is survives
 
 
+@pytest.mark.slow
 def test_a_survey_of_three_masses_and_two_clearances() -> None:
     """Its orbits close in the independent integrator too, with their impacts. At ω = 0.6221 the
     damped contact ends at the very strobe: the branch goes on over the kink."""

@@ -209,6 +209,7 @@ def test_no_branch_falls_back_onto_its_parent() -> None:
     assert named == [("1-5-5", False), ("1-5-5", True)]
 
 
+@pytest.mark.slow
 def test_doubling_is_where_long_runs_change_their_period() -> None:
     p = point(first_cascade(), PointKind.DOUBLING, 1.34995)
     for shift, n in ((3e-3, 1), (-3e-3, 2)):
@@ -321,6 +322,7 @@ def below_1_6_6() -> Survey:
     return survey(over, [(0.28, settle(over.flow(0.28), np.zeros(4)))], 0.27, 0.3, depth=1)
 
 
+@pytest.mark.slow
 def test_a_branch_begins_with_the_counts_of_the_orbit_that_it_leaves() -> None:
     found = below_1_6_6()
     children = [
@@ -366,6 +368,7 @@ def test_windows_end_where_a_change_of_stability_was_not_located() -> None:
     assert guessed.low.error < 1e-2
 
 
+@pytest.mark.slow
 def test_windows_have_one_response_where_a_grazing_was_not_located() -> None:
     branch = branch_of(PAPER, 0.85, "omega", 0.76, 0.95)
     points = locate(branch)

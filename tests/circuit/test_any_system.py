@@ -204,7 +204,7 @@ def both_sided(system: SecondOrderSystem) -> frozenset[int]:
     return frozenset(i for i, zone in zones if len(zone.sides) == 2 and not zone.limits)
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6), apart=st.booleans())
 def test_every_mode_has_the_model_s_matrices(seed: int, apart: bool) -> None:
     system = random_system(seed)
@@ -465,7 +465,7 @@ def test_of_boards_together_some_rest_open_and_some_against_a_stop() -> None:
     assert np.abs(resting_voltages(boards, ["v1"])[:, 0]) == pytest.approx(wanted, rel=1e-5)
 
 
-@settings(max_examples=10)
+@settings(max_examples=3)
 @given(seed=st.integers(0, 10**6))
 def test_modes_that_some_boards_enter_are_those_of_all(seed: int) -> None:
     """Taken from many boards and added to, they are what those boards have for themselves."""

@@ -40,6 +40,7 @@ def csv_of(number: int, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path) -> None:
     files = [csv_of(2, tmp_path / "a.csv"), csv_of(8, tmp_path / "b.csv")]
     out = tmp_path / "board"

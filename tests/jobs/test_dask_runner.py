@@ -43,6 +43,7 @@ def _store(root: Path, p: StudyPlan) -> BlockStore[Answer]:
     return BlockStore(root, "samples.parquet", Answer, study_hash(p), size=4)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_equal_files(address: str, tmp_path: Path) -> None:
     p = plan(22)
     for name in ("here", "there"):
@@ -111,6 +112,7 @@ def test_a_scheduler_that_dies_is_said() -> None:
                 pass
 
 
+@pytest.mark.slow
 def test_nobody_at_the_address(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

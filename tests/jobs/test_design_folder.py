@@ -293,6 +293,7 @@ def test_json_is_strict() -> None:
         dumps({"a": object()})
 
 
+@pytest.mark.slow
 def test_files_stand_before_what_takes_longer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

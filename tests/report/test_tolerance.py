@@ -165,6 +165,7 @@ def rows_of(table: Table | None) -> tuple[tuple[str, ...], ...]:
     return table.rows
 
 
+@pytest.mark.slow
 def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
     for part in (kinds, differences, recipes, limits, avoided, corners, maps, boards):
         assert part(plain) is None

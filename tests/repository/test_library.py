@@ -239,6 +239,7 @@ def test_a_path_without_a_folder_to_write_is_refused_as_on_the_command_line(mode
         designer.synthesise(designer.read_model_file(model)).boards()
 
 
+@pytest.mark.slow
 def test_run(model: Path) -> None:
     """In ngspice, one response."""
     file = designer.read_model_file(model)

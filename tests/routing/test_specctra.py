@@ -121,6 +121,7 @@ def test_another_router_is_told_what_kicad_would_tell_it(tmp_path: Path) -> None
     assert edge(made) == edge(true)
 
 
+@pytest.mark.slow
 def test_each_net_has_the_width_and_clearance_of_its_class(tmp_path: Path) -> None:
     made = ours(project(tmp_path, routed()))
     sizes = dict[str, tuple[float, float]]()
@@ -205,6 +206,7 @@ def test_a_session_is_read_as_kicad_reads_it(tmp_path: Path) -> None:
     assert tracks(with_session(routed(), file)) == by_kicad
 
 
+@pytest.mark.slow
 def test_what_a_session_leaves_open_is_routed_here(tmp_path: Path) -> None:
     """A whole session leaves nothing to do; without one net, that net alone is routed."""
     circuit, file = case(NAME).circuit, tmp_path / "board.ses"

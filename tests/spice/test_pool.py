@@ -22,6 +22,7 @@ from designer.spice import pool as workers
 from designer.spice.batch_backend import program_version
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import Backend, SimulationFailed, SpiceJob, Waveforms
+from tests.shared.exploring import quick
 
 
 def deck(ohms: float) -> str:
@@ -140,6 +141,7 @@ def ends(pid: int) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_workers(pool: SpicePool) -> None:
     jobs = [job(everything, deck(1e3 + 37.0 * i)) for i in range(12)]
     jobs[3] = job(last_value, FLOATING)
@@ -219,7 +221,7 @@ def test_a_job_is_tried_again(pool: SpicePool, tmp_path: Path) -> None:
     assert isinstance(result, float)
 
 
-@pytest.mark.parametrize("backend", ["shared", "batch"])
+@pytest.mark.parametrize("backend", quick(["shared", "batch"]))
 def test_a_job_that_hangs(backend: Backend, folder: Path) -> None:
     # neither ngspice itself nor the analysis may take for ever
     endless = job(last_value, deck(1e3).replace(".tran 5u 2m 0 5u", ".tran 5u 1e6 0 5u"))
@@ -357,6 +359,7 @@ def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_workers_of_a_killed_parent_end_amid_their_jobs(tmp_path: Path) -> None:
     process, pids, _ = start_interrupted(tmp_path)
     process.kill()
@@ -368,6 +371,7 @@ _LEFT = """
 import multiprocessing
 import sys
 from designer.spice.worker import work
+from tests.shared.exploring import quick
 
 if __name__ == "__main__":
     context = multiprocessing.get_context("spawn")

@@ -174,6 +174,7 @@ def test_matched_parts_stay_single(matched: tuple[tuple[str, str], ...]) -> None
         assert made.composites, "others may still be two parts"
 
 
+@pytest.mark.slow
 def test_a_design_folder_with_composites_is_read_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

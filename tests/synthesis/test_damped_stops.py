@@ -29,6 +29,7 @@ from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
 from designer.workbench.force_balance import ForceBalance
 from designer.workbench.prediction import POINTS as WAVE_POINTS, BoardPrediction
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
@@ -82,7 +83,7 @@ def excitation_of(result: Synthesis) -> Excitation:
     return design.excitation(response.b, response.omega)
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS))
 def test_chosen_parts_do_what_the_model_does(name: str) -> None:
     result = made(name)
     shows_what_the_model_does(result)
@@ -103,6 +104,7 @@ def with_damper(result: Synthesis, factor: float) -> Synthesis:
     return replace(result, design=replace(result.design, circuit=replace(circuit, parts=parts)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["restitution", "both sides"])
 def test_ngspice_s_transfer_functions_know_the_damper(name: str, pool: SpicePool) -> None:
     """In each contact they are the model's; with another damper they are not, and only there."""

@@ -24,6 +24,7 @@ def study(folder: Path, model: Path, *options: str) -> dict[str, object]:
     return response
 
 
+@pytest.mark.slow
 def test_every_layer_counts_boards_that_stay_chaotic(tmp_path: Path) -> None:
     """As built, tuned, from power-up and blamed; the boards that fall into a period are lost."""
     options = ("--samples", "20", "--tuned", "--reached", "--blame-budget", "300")
@@ -47,6 +48,7 @@ def test_every_layer_counts_boards_that_stay_chaotic(tmp_path: Path) -> None:
     assert "designer search" not in page  # which follows orbits, and would refuse
 
 
+@pytest.mark.slow
 def test_a_least_exponent_decides_boards(tmp_path: Path) -> None:
     """The model's is 0.154. A first estimate of a board's, to 6 %, cannot be told from 0.14, and is
     made better until it can."""
