@@ -28,6 +28,7 @@ SAID: dict[str, Any] = {
 } | {"exit": 2, "said": "circuit: no choice of parts"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", seeds(4))
 def test_each_file_is_read_and_shows_its_response(number: int) -> None:
     stranger = draw(7, number)

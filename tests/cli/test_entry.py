@@ -30,7 +30,6 @@ from designer.cli.command_line import application
 from designer.folders.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
 from designer.verbs.declared import GROUPS
-from designer.verdicts.cross_check import OWN_SAMPLES
 from tests.shared.blank_figures import blank_figures
 from tests.shared.exploring import quick
 from tests.shared.folder_contents import without_cost
@@ -42,7 +41,7 @@ HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [
 BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 SMALL = BASE + WANTED
-SAMPLES = 12
+SAMPLES = 3
 
 
 def _process(*arguments: str | Path, **more: Any) -> subprocess.Popen[str]:
@@ -181,7 +180,7 @@ def test_run_prints_one_object_and_nothing_else(
     assert set(counted) == {"ok", "lost", "grazing", "failed", "samples", "low", "high"}
     assert counted["samples"] == SAMPLES
     assert counted["ok"] + counted["lost"] + counted["grazing"] + counted["failed"] == SAMPLES
-    assert response["agreement"]["asked"] >= OWN_SAMPLES
+    assert response["agreement"]["asked"] == SAMPLES
     assert response["agreement"]["nominal_start"]["asked"] == SAMPLES
     assert "Traceback" not in done.stderr
     assert out.is_dir()
@@ -193,7 +192,9 @@ def test_a_process_prints_the_same_and_nothing_else(
     undisturbed: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
     answers = [_strict(done.stdout) for _, done in (finished, undisturbed)]
-    assert {**answers[0], "cost": 0} == {**answers[1], "cost": 0}
+    same = ("parts", "errors", "responses")
+    assert {key: answers[0][key] for key in same} == {key: answers[1][key] for key in same}
+    assert answers[0].keys() == answers[1].keys()
     assert "Traceback" not in undisturbed[1].stderr
 
 
@@ -322,12 +323,12 @@ def test_overwrite_replaces_listed_files_only(
     for name in ("notes.txt", "samples.parquet/mine.parquet"):
         (out / name).write_text("mine")
     before = _tree(out)
-    fewer = ["tolerance", str(out), "--samples", "10", "--rung", "exact", "--no-blame", "-q"]
+    fewer = ["tolerance", str(out), "--samples", "2", "--rung", "exact", "--no-blame", "-q"]
     _refused(fewer, capfd, "manifest.json", f"samples {SAMPLES}", "--overwrite")
     _refused([*fewer, "--resume"], capfd, "manifest.json", "--overwrite")
     assert _tree(out) == before
     assert entry.status([*fewer, "--overwrite", "--json"]) == 0
-    assert _strict(capfd.readouterr().out)["responses"][0]["yield"]["samples"] == 10
+    assert _strict(capfd.readouterr().out)["responses"][0]["yield"]["samples"] == 2
     after = _tree(out)
     assert {n for n in after if n.startswith("samples")} == {
         "samples.parquet/block-000000.parquet",

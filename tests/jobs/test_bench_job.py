@@ -16,6 +16,7 @@ from designer.folders import design_source
 from designer.jobs import bench_job
 from designer.verbs.bench import bench, channels_of
 from designer.workbench import naming
+from tests.shared.exploring import quick
 from tests.shared.paper_cases import synthesised
 from tests.workbench.stored_records import stored
 
@@ -115,7 +116,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), EnvironmentMissing("no ngspice")])
+@pytest.mark.parametrize("error", quick([KeyboardInterrupt(), EnvironmentMissing("no ngspice")]))
 def test_what_stands_before_ngspice_is_kept(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:

@@ -18,6 +18,7 @@ from designer.board.sexpr import Expression, expression_text, read
 from designer.routing.board_copper import BoardCopper, layer_count, read_copper, with_layers
 from designer.routing.net_kinds import kinds_of_nets, net_kinds
 from designer.routing.routed_board import RoutedBoard, cut_open, route_board
+from tests.shared.answer_store import stored
 from tests.shared.kicad_cases import case, case_files
 
 NAME = "one mass"
@@ -30,7 +31,8 @@ def placed() -> str:
 @cache
 def routed() -> RoutedBoard:
     circuit = case(NAME).circuit
-    return route_board(placed(), circuit, board_rules(circuit))
+    made: RoutedBoard = stored(route_board)(placed(), circuit, board_rules(circuit))
+    return made
 
 
 @cache

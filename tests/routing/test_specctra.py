@@ -16,8 +16,9 @@ from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY
 from designer.board.sexpr import Expression, expression, expression_text, read, word
 from designer.routing.board_copper import read_copper
-from designer.routing.routed_board import route_board
+from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
+from tests.shared.answer_store import stored
 from tests.shared.kicad_cases import case, case_files, written
 from tests.shared.kicad_python import asked_of_pcbnew
 
@@ -47,7 +48,8 @@ def board_name() -> str:
 @cache
 def routed() -> str:
     circuit = case(NAME).circuit
-    return route_board(placed(), circuit, board_rules(circuit)).text
+    made: RoutedBoard = stored(route_board)(placed(), circuit, board_rules(circuit))
+    return made.text
 
 
 def project(folder: Path, text: str) -> Path:

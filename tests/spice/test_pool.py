@@ -22,7 +22,6 @@ from designer.spice import pool as workers
 from designer.spice.batch_backend import program_version
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import Backend, SimulationFailed, SpiceJob, Waveforms
-from tests.shared.exploring import quick
 
 
 def deck(ohms: float) -> str:
@@ -221,7 +220,8 @@ def test_a_job_is_tried_again(pool: SpicePool, tmp_path: Path) -> None:
     assert isinstance(result, float)
 
 
-@pytest.mark.parametrize("backend", quick(["shared", "batch"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", ["shared", "batch"])
 def test_a_job_that_hangs(backend: Backend, folder: Path) -> None:
     # neither ngspice itself nor the analysis may take for ever
     endless = job(last_value, deck(1e3).replace(".tran 5u 2m 0 5u", ".tran 5u 1e6 0 5u"))
@@ -371,7 +371,6 @@ _LEFT = """
 import multiprocessing
 import sys
 from designer.spice.worker import work
-from tests.shared.exploring import quick
 
 if __name__ == "__main__":
     context = multiprocessing.get_context("spawn")

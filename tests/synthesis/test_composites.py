@@ -124,7 +124,8 @@ def truth(made: Design) -> float:
     return coefficient_error(values, Plain(m.m, m.k, m.k0, m.c, m.zeta, m.f20, m.b))
 
 
-@pytest.mark.parametrize("names", [pytest.param(True, marks=pytest.mark.slow), ("R50", "R210")])
+@pytest.mark.slow
+@pytest.mark.parametrize("names", [True, ("R50", "R210")])
 def test_the_paper_s_case_in_e24_is_exact_with_composites(names: bool | tuple[str, ...]) -> None:
     """Of the first linear block no pairs are enough; those of one beside it are."""
     alone, made = design(False), design(names)

@@ -158,6 +158,7 @@ def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
         assert np.abs(got - wanted)[2:].max() < 5e-3 * np.abs(wanted).max(), net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["both sides", "between masses"])
 def test_boards_that_leap_are_those_of_the_general_kernel(name: str) -> None:
     """Orbits and multipliers: these come from the jump of the rates where a contact begins."""

@@ -143,6 +143,7 @@ def _indices_of(a: Array, b: Array, ab: Array) -> list[list[float]]:
     ]
 
 
+@pytest.mark.slow
 def test_the_noise_of_an_index_shrinks_with_the_base_and_covers_the_truth() -> None:
     margin = margin_of({"R4": (3.0,), "R5": (1.0,), "U1A.offset": (2.0,)})[0]
     few, many = indices(margin, 128), indices(margin, 2048)
@@ -268,6 +269,7 @@ def test_where_only_offsets_differ_offsets_have_all_the_attribution() -> None:
     assert high == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
     found = offsets_attributed().responses[0]
     study = plan(2, "offsets")

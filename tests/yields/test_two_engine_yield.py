@@ -80,7 +80,7 @@ def joined(answers: list[Answer], said: dict[int, bool], boundary: bool = True) 
     return both
 
 
-@pytest.mark.parametrize("boundary", [True, False])
+@pytest.mark.parametrize("boundary", quick([True, False]))
 @pytest.mark.parametrize(
     ("boards", "rate", "gain", "loss"),
     quick(
