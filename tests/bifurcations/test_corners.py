@@ -100,6 +100,7 @@ HANGING = table("law", name="F", between=list(JOINT), points=[[-1, 0], [0.7, 0],
 """No force up to 0.7."""
 
 
+@pytest.mark.slow
 def test_a_corner_of_a_law_that_a_sweep_moves() -> None:
     """It is touched where it stands at the amplitude of the linear motion, over two parameters
     where this is so at every force."""

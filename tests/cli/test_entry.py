@@ -418,6 +418,7 @@ def test_a_response_that_is_not_there_is_exit_1(
         assert entry.status(["synthesise", str(model), "--out", str(out), "-q"]) == 1
 
 
+@pytest.mark.slow
 def test_synthesis_without_responses_or_stops(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

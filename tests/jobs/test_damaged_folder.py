@@ -25,10 +25,10 @@ pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once
 
 BLOCK = "samples.parquet/block-000000.parquet"
 VERBS = {
-    "run": ["run", "{}", *STUDY],
     "tolerance": ["tolerance", "{}", *EXACT],
-    "another layer": ["tolerance", "{}", *EXACT, "--map", "grade"],
     "export": ["export", "{}"],
+    "run": ["run", "{}", *STUDY],
+    "another layer": ["tolerance", "{}", *EXACT, "--map", "grade"],
     "rules": ["rules", "{}"],
     "simulate": ["simulate", "{}", "--omega", "0.85", "--engine", "circuit", "--starts", "1"],
     "bifurcation": ["bifurcation", "{}", "--circuit", "--from", "1", "--to", "0.9", "--steps", "3"],

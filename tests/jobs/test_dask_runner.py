@@ -80,6 +80,7 @@ class Deadly:
         return [self.number]
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_loses_nothing(address: str, tmp_path: Path) -> None:
     marker = tmp_path / "killed"
     with Cluster(address) as there:
@@ -137,6 +138,7 @@ def test_a_scheduler_without_workers(monkeypatch: pytest.MonkeyPatch) -> None:
         Cluster(empty.scheduler_address)
 
 
+@pytest.mark.slow
 def test_workers_with_other_rules_are_refused(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -176,6 +176,7 @@ def test_a_board_is_told_in_hertz_and_volts() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_aperiodic_stretches_are_in_the_table_and_the_legend(
     capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

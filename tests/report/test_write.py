@@ -262,6 +262,7 @@ def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
     assert "(30 to 95)" in bars
 
 
+@pytest.mark.slow
 def test_commands_have_the_name_of_the_folder(whole: ReportData) -> None:
     data = replace(whole, folder="a rig; <b>")
     html, text = without_pictures(data), render_markdown(data)
@@ -464,6 +465,7 @@ def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     assert f"    run {' '.join(HOSTILE.split())}" in markdown.splitlines()
 
 
+@pytest.mark.slow
 def test_a_response_that_is_left_out_of_the_study(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=whole.plan.questions[:2])
     answers = tuple(a for a in whole.study.answers if a.question < 2)
@@ -514,6 +516,7 @@ def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
     assert (data.study.all_on_one_board.ok, data.study.all_on_one_board.lost) == (0, 4)
 
 
+@pytest.mark.slow
 def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
     answers = [
         replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.study.answers
@@ -530,6 +533,7 @@ def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
     assert "3 runs gave no answer, which the yields leave out" in text
 
 
+@pytest.mark.slow
 def test_results_of_a_script_have_no_command(whole: ReportData) -> None:
     nameless = replace(whole, command="")
     for text in (words_of(nameless).text, render_markdown(nameless)):

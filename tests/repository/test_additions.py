@@ -276,6 +276,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_a_variant_of_the_rectifier_touches_two_files(tmp_path: Path) -> None:
     """Its name, and what is built: here a stage each half of which has an output of its own,
     whether its halves are equal or not. It is chosen, and shows what the model does."""
@@ -391,6 +392,7 @@ print(json.dumps([off, np.abs(points).max(axis=0).tolist()]))
 """
 
 
+@pytest.mark.slow
 def test_a_simulator_touches_two_files(tmp_path: Path) -> None:
     """Its name, and what differs in its deck: here how voltages are kept. ngspice reads the rest:
     two periods with impacts are those of the exact circuit."""

@@ -117,7 +117,7 @@ def test_ngspice_s_transfer_functions_know_the_damper(name: str, pool: SpicePool
     assert not any(f.name == "transfer, open" for f in wrong.findings if not f.passed)
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS))
 def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
     """Two periods from a state in contact: the deck gives every damper the voltage that it has."""
     result = made(name)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from designer.cli import entry
+from tests.shared.exploring import quick
 from tests.shared.quick_folders import quick_folder
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,7 +62,9 @@ def test_a_least_exponent_decides_boards(tmp_path: Path) -> None:
     assert not counted["failed"]
 
 
-@pytest.mark.parametrize("options", [("search", "--out"), ("search", "--yield", "0.95")])
+@pytest.mark.parametrize(
+    "options", quick(map(pytest.param, [("search", "--out"), ("search", "--yield", "0.95")]))
+)
 def test_what_follows_orbits_refuses(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
 ) -> None:
