@@ -42,6 +42,8 @@ REPORT = ROOT / "reports" / "mutation"
 ROWS, JUDGED = "rows.jsonl", "judged.toml"
 SEED, COUNT = 1, 500
 QUICK = "not (slow or kicad or browser or wheel or docs)"
+ASKED = "not (kicad or browser or wheel or docs)"
+"""The slow tests too: of those that run a statement the quickest are asked first."""
 PATIENCE = 3.0
 """Times the seconds that the slowest test of a file takes without a mutant, after which one of the
 file is ended: the first of them makes what all share."""
@@ -123,7 +125,7 @@ class Copy:
         self, files: Sequence[str], limits: Mapping[str, float] | None = None,
         before: Sequence[str] = (), kernels: str = "kernels",
     ) -> Outcome:  # fmt: skip
-        """Run the quick tests of these files until one fails.
+        """Run the tests of these files until one fails.
 
         limits : tests in their order, and the seconds that each may take; all, where there are
         none. before : words between ``python`` and ``-m pytest``.
@@ -135,7 +137,7 @@ class Copy:
         if limits is not None:
             chosen.write_text(json.dumps(limits), "utf-8")
             more[ORDER] = str(chosen)
-        words = [sys.executable, "-P", *before, "-m", "pytest", "-q", "-x", "-m", QUICK]
+        words = [sys.executable, "-P", *before, "-m", "pytest", "-q", "-x", "-m", ASKED]
         words += ["-p", "benchmarks.mutant_tests", "-p", "no:cacheprovider", *files]
         with (self.work / "log.txt").open("wb") as log:
             process = subprocess.Popen(

@@ -39,6 +39,7 @@ def sum_of_roots(module: str) -> tuple[Callable[..., float], Any]:
     return numba.njit(**OPTIONS)(total), compiled_root
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("module", "late"), [("designer.kernels.some", True), ("other", False)])
 def test_only_callees_of_our_kernels_wait_for_their_callers(module: str, late: bool) -> None:
     total, root = sum_of_roots(module)

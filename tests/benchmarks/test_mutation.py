@@ -152,6 +152,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("operator", "after", "result", "by"),
     [

@@ -28,6 +28,7 @@ SAID: dict[str, Any] = {
 } | {"exit": 2, "said": "circuit: no choice of parts"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", seeds(4))
 def test_each_file_is_read_and_shows_its_response(number: int) -> None:
     stranger = draw(7, number)
@@ -129,6 +130,7 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         bench_strangers.main([*words, "--seed", "8"])
 
 
+@pytest.mark.slow
 def test_what_was_refused_is_sought_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = {"found": True, "max_error": 4e-3}
     refused = {**SAID, "outcome": REFUSED, "cpu": 3.0}
@@ -169,6 +171,7 @@ def test_counts() -> None:
     assert (said["yield_95"], said["yield_asked"]) == (1, 2)
 
 
+@pytest.mark.slow
 def test_a_process_is_ended_at_its_limit() -> None:
     loop = "import sys\nprint('parts stand', file=sys.stderr, flush=True)\nwhile True: pass"
     run = bench_strangers.Run([sys.executable, "-c", loop], 1, "parts stand")
@@ -183,6 +186,7 @@ def test_options_belong_to_one_benchmark(capsys: pytest.CaptureFixture[str]) -> 
     assert "flow has no options" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_other_search_finds_parts_where_there_are_some_and_none_where_there_are_none() -> None:
     text = draw(7, 2).text
     found = stranger_parts.search(parse_model_file(text), 30.0)

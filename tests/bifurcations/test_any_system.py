@@ -120,6 +120,7 @@ def test_grazing_on_a_moving_ground(omega: float, survives: bool) -> None:
     assert branch.points[-1].stable is survives
 
 
+@pytest.mark.slow
 def test_a_survey_of_three_masses_and_two_clearances() -> None:
     """Its orbits close in the independent integrator too, with their impacts. At ω = 0.6221 the
     damped contact ends at the very strobe: the branch goes on over the kink."""
@@ -218,6 +219,7 @@ def test_a_domain_narrower_than_a_thousandth_hides_no_mirror_of_one_value_alone(
     assert not replace(family, low=-1e-4, high=1e-4).mirrored(0.0)
 
 
+@pytest.mark.slow
 def test_a_grazing_curve_goes_through_equal_gaps() -> None:
     """Each stop is touched where the response without one is as large as its gap."""
     found: Any = bifurcation(ALIKE, from_=1.7, to=2.5, steps=17, and_=("A.upper", 0.45, 0.55))

@@ -37,6 +37,7 @@ def _strobe(omega: float, x: Array, phase: float, periods: int) -> Array:
     return np.asarray(run.y[:, -1])
 
 
+@pytest.mark.slow
 def test_every_start_ends_where_another_integrator_ends() -> None:
     """At ω = 1.43, where both twins of 1-1-1 are: each start is on the one that it counts for."""
     plan = _plan(1.43, 1.5, 2, 5)

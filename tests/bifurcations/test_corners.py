@@ -100,6 +100,7 @@ HANGING = table("law", name="F", between=list(JOINT), points=[[-1, 0], [0.7, 0],
 """No force up to 0.7."""
 
 
+@pytest.mark.slow
 def test_a_corner_of_a_law_that_a_sweep_moves() -> None:
     """It is touched where it stands at the amplitude of the linear motion, over two parameters
     where this is so at every force."""
@@ -162,6 +163,7 @@ def curve_of_corner(
     return curve
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_corner_over_two_parameters() -> None:
     over = subject(STIFFENING, 0.0, 1.6, 1.0)
     curve = curve_of_corner(over, 1.6, (1.36, 1.7), PlaneWindow((1.2, 1.7), (0.6, 1.8)))
@@ -209,6 +211,7 @@ def test_a_velocity_that_is_largest_where_a_damped_stop_is_met() -> None:
     assert continued(over.plane("a.amplitude", "omega"), point, omega, window) is None
 
 
+@pytest.mark.slow
 def test_a_fold_on_the_curve_of_a_corner() -> None:
     """A spring that hardens past ± 1, and once more past ± 2: twice a motion that just comes to 2
     has a multiplier 1, by another integrator. The curve of the fold sees it too."""
@@ -253,6 +256,7 @@ def test_a_fold_on_the_curve_of_a_corner() -> None:
         assert np.abs(multipliers - 1.0).min() < 1e-4
 
 
+@pytest.mark.slow
 def test_where_a_preload_has_risen() -> None:
     """A stop's push that has come to its end bends the force: by another integrator the motion just
     reaches there."""
@@ -284,6 +288,7 @@ def test_where_a_preload_has_risen() -> None:
     assert set(curve.ends) == {"edge of omega"}
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
     """A law so weak that the motion is linear: the lower of two maxima comes to 1, and is no more
     where height, rate and curvature of a sine and its third harmonic say so."""
@@ -308,6 +313,7 @@ def test_the_curve_of_a_corner_ends_where_the_turning_point_does() -> None:
     assert end.values == pytest.approx(wanted, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_curves_of_two_corners_meet() -> None:
     """Of laws so weak that both masses move as the linear system does."""
     masses, springs = {"a": 1.0, "b": 2.0}, {JOINT: 1.0, ("a", "b"): 0.5, ("b", "ground"): 1.5}

@@ -40,6 +40,7 @@ def facts(points: list[Bifurcation]) -> list[tuple[str, float]]:
     return sorted((str(p.kind), round(p.value, 8)) for p in points)
 
 
+@pytest.mark.slow
 def test_a_loop_is_followed_once_round() -> None:
     """It turns back an even number of times, and its last orbit is its first, some periods on."""
     branch = loop(1.55)

@@ -67,6 +67,7 @@ def curve(kind: PointKind, near: float) -> PlaneCurve:
     return followed
 
 
+@pytest.mark.slow
 def test_grazing_of_the_linear_response_by_its_closed_form() -> None:
     """x1 reaches b where its amplitude without stops is b, at every ω."""
     exact = abs(response_amplitude(PLAIN, 1.55)[0])

@@ -27,6 +27,7 @@ from designer.dynamics.turning_points import heights
 from designer.model import swept_model
 from designer.model.mechanics import SecondOrderSystem
 from tests.bifurcations.test_continuation import PAPER, PLAIN, branch_of, linear_branch, monodromy
+from tests.shared.exploring import quick
 from tests.shared.oracles import Plain, integrate, response_amplitude
 from tests.shared.paper_cases import subject
 
@@ -68,7 +69,7 @@ def test_grazing_of_the_linear_response_is_where_its_amplitude_is_the_clearance(
         assert abs(found[0].value - exact) < 1e-10
 
 
-@pytest.mark.parametrize("omega", [0.7, 1.55, 2.2])
+@pytest.mark.parametrize("omega", quick([0.7, 1.55, 2.2]))
 def test_grazing_over_the_clearance(omega: float) -> None:
     exact = amplitude_at(omega)
     over = swept_model.of_model(PAPER, omega, "b")
@@ -93,6 +94,7 @@ class Stalling(Curve):
         return solved and replace(solved, y=solved.y + off, residual=3e-10)
 
 
+@pytest.mark.slow
 def test_error_of_a_point_grows_with_what_newtons_method_left() -> None:
     exact = amplitude_at(1.55)
     over = swept_model.of_model(PAPER, 1.55, "b")
@@ -209,6 +211,7 @@ def test_no_branch_falls_back_onto_its_parent() -> None:
     assert named == [("1-5-5", False), ("1-5-5", True)]
 
 
+@pytest.mark.slow
 def test_doubling_is_where_long_runs_change_their_period() -> None:
     p = point(first_cascade(), PointKind.DOUBLING, 1.34995)
     for shift, n in ((3e-3, 1), (-3e-3, 2)):
@@ -279,6 +282,7 @@ def test_heights_are_the_margins_of_the_exact_flow() -> None:
     assert len(positive) >= orbit.p + orbit.q
 
 
+@pytest.mark.slow
 def test_windows_are_what_settling_finds() -> None:
     found = all_windows(first_cascade())
     named = {(w.response, w.symmetric): w for w in found if w.width > 0.02}
@@ -321,6 +325,7 @@ def below_1_6_6() -> Survey:
     return survey(over, [(0.28, settle(over.flow(0.28), np.zeros(4)))], 0.27, 0.3, depth=1)
 
 
+@pytest.mark.slow
 def test_a_branch_begins_with_the_counts_of_the_orbit_that_it_leaves() -> None:
     found = below_1_6_6()
     children = [
@@ -339,6 +344,7 @@ def test_a_branch_begins_with_the_counts_of_the_orbit_that_it_leaves() -> None:
         assert sum(p.kind is PointKind.GRAZING for p in found.on(number)) == changes
 
 
+@pytest.mark.slow
 def test_window_behind_a_grazing_does_not_begin_at_the_pitchfork() -> None:
     one = next(w for w in all_windows(below_1_6_6()) if w.response in ("1-6-5", "1-5-6"))
     fork = next(
@@ -366,6 +372,7 @@ def test_windows_end_where_a_change_of_stability_was_not_located() -> None:
     assert guessed.low.error < 1e-2
 
 
+@pytest.mark.slow
 def test_windows_have_one_response_where_a_grazing_was_not_located() -> None:
     branch = branch_of(PAPER, 0.85, "omega", 0.76, 0.95)
     points = locate(branch)

@@ -37,6 +37,7 @@ def test_room_by_trying_every_point_of_the_border() -> None:
     assert room(border, np.zeros((1, 2)))[0] > 0.0
 
 
+@pytest.mark.slow
 def test_region_without_impacts_ends_where_the_linear_response_reaches_the_stop() -> None:
     """Its border is b = |X1(ω)|; above that there is nothing but the window."""
     exact = abs(response_amplitude(PLAIN, 1.55)[0])

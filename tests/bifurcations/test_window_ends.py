@@ -165,6 +165,7 @@ def point_of(found: WindowEnds, end: SweptEnd) -> Bifurcation:
 # ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_response_entered_from_chaos_ends_where_its_branch_folds() -> None:
     """Twelve steps past the last one that shows 1-2-2; the multiplier there is 1 by a difference of
     the period (tests/bifurcations/test_branch_points_independently.py has the integrator's)."""
@@ -182,6 +183,7 @@ def test_a_response_entered_from_chaos_ends_where_its_branch_folds() -> None:
     assert (high.kind, high.value) == ("fold", fold.value)
 
 
+@pytest.mark.slow
 def test_a_hysteretic_window_ends_at_a_torus_outside_it(tmp_path: Path) -> None:
     """The beam comes down on 2-1-0 as late as 34.5 Hz, and has it up to a torus at 34.7061 Hz; up,
     it comes on 2-1-0 again at 36.5 Hz. At both ends a pair of multipliers has modulus 1."""
@@ -194,6 +196,7 @@ def test_a_hysteretic_window_ends_at_a_torus_outside_it(tmp_path: Path) -> None:
         hold(system, point_of(found, end))
 
 
+@pytest.mark.slow
 def test_an_end_that_is_not_located_is_a_row_that_says_so(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -274,6 +277,7 @@ BASE_BEAM = system_text(
 lie within one step of a branch that comes from above."""
 
 
+@pytest.mark.slow
 def test_stability_that_is_lost_and_had_again_within_a_step_ends_a_window(tmp_path: Path) -> None:
     made = swept(tmp_path / "beam.toml", BASE_BEAM, 37.0, 45.0, 9, "up")
     found = window_ends.find(made)

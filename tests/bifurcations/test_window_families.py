@@ -7,6 +7,7 @@ Both are the same equations. As stops they tell by names what the law shows with
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import Sweep, SweepPlan, follow
@@ -54,6 +55,7 @@ def test_a_window_ends_where_the_sweep_jumps_to_another_orbit_of_its_name() -> N
     assert families(stops) == families(law) == (1, 2, 1)
 
 
+@pytest.mark.slow
 def test_windows_that_an_orbit_goes_through_are_one_family() -> None:
     """The asymmetric orbit gains an impact by grazing and loses it again; the law has no impacts,
     and one window. The sweeps come to twins, which are two orbits, and leave by a pitchfork for the

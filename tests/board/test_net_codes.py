@@ -52,6 +52,7 @@ def routed() -> RoutedBoard:
     return route_board(drawn(), base().circuit, custom())
 
 
+@pytest.mark.slow
 def test_a_board_with_named_nets_is_read_as_one_with_numbers(tmp_path: Path) -> None:
     nine = routed().text
     ten = by_name(nine)
@@ -70,6 +71,7 @@ def test_a_board_with_named_nets_is_read_as_one_with_numbers(tmp_path: Path) -> 
     assert verdicts[0] == verdicts[1]
 
 
+@pytest.mark.slow
 def test_a_board_with_named_nets_is_routed_in_its_own_form(tmp_path: Path) -> None:
     nine = routed()
     ten = route_board(by_name(drawn()), base().circuit, custom())

@@ -25,6 +25,7 @@ from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.synthesis import parts_choice
 from tests.shared.chains import chain_text
+from tests.shared.exploring import quick
 from tests.shared.search_cases import asked, catalog, file
 from tests.shared.system_text import clearance
 
@@ -135,6 +136,7 @@ def test_the_search_finds_the_best_of_every_combination(monkeypatch: pytest.Monk
     assert worth.alone > found.start.rank
 
 
+@pytest.mark.slow
 def test_places_that_stay_where_they_were_are_worth_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -187,6 +189,7 @@ def _enumerated(modelfile: ModelFile, choice: DesignChoice) -> Candidate:
     return Candidate(choice, design, found, scored)
 
 
+@pytest.mark.slow
 def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -225,6 +228,7 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     assert len(never) > len(slower) - 1
 
 
+@pytest.mark.slow
 def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -245,7 +249,7 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
     assert [h.adopted for h in found.checks if h.fidelity == FIDELITY] == [True, False]
 
 
-@pytest.mark.parametrize("bears_out", [True, False])
+@pytest.mark.parametrize("bears_out", quick([True, False]))
 def test_ngspice_is_asked_about_what_the_bandwidth_bears_out(
     monkeypatch: pytest.MonkeyPatch, bears_out: bool
 ) -> None:

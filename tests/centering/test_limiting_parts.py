@@ -137,6 +137,7 @@ def test_causes() -> None:
     assert cause(Quantity("R500", "values", 1e4, 58.0)) == COEFFICIENTS
 
 
+@pytest.mark.slow
 def test_on_a_design_the_shares_add_up() -> None:
     synthesis = made()
     checked = checked_design.check(synthesis.design, synthesis.model_responses, None)

@@ -67,6 +67,7 @@ from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.yield_count import Yield
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared import bench_plans, paper_cases
+from tests.shared.exploring import quick
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.report_data import NO_ORIGIN
@@ -114,6 +115,7 @@ def known_picture(nominal: float) -> LinearModel:
     return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5)
 
 
+@pytest.mark.slow
 def test_a_demand_holds_the_variance_of_the_drawn_boards() -> None:
     seen = known_picture(8.0)
     slots = len(seen.parts)
@@ -775,7 +777,7 @@ def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
     assert [o.price for o in again.slot.options] == [0.0, pytest.approx(0.0, abs=1e-12)]
 
 
-@pytest.mark.parametrize("nominal", [5.5, 6.5])
+@pytest.mark.parametrize("nominal", quick([6.5, 5.5]))
 def test_a_trimmer_is_chosen_where_it_is_the_cheapest(nominal: float) -> None:
     """Against every choice; the trimmer's price is set so that it falls on either side."""
     plain = by_hand(nominal)

@@ -45,6 +45,7 @@ def only(kind: str, base: Synthesis, target: float) -> Repair:
     return find_repair(base, target, trim=BAND, without=frozenset(KINDS) - {kind}, seed=3, jobs=1)
 
 
+@pytest.mark.slow
 def test_the_references_are_taken_where_they_move_the_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

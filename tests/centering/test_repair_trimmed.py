@@ -65,6 +65,7 @@ def ways(best: StudyPlan, target: float) -> list[ResponseWay] | None:
     )
 
 
+@pytest.mark.slow
 def test_what_trimmed_boards_show_is_what_a_study_of_them_finds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

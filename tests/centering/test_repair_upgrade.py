@@ -133,6 +133,7 @@ def test_a_response_moves_in_the_key_of_its_frequency(
     assert tomllib.loads(stays.text)["response"][0][key] == tomllib.loads(f"key = {stated}")["key"]
 
 
+@pytest.mark.slow
 def test_a_better_part_is_bought_and_spreads_less(base: Synthesis) -> None:
     made = with_same_parts(base, upgraded_file(base.modelfile, Upgrades(grades={"R50": 0.001})))
     circuit = made.design.circuit

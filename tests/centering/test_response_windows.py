@@ -21,6 +21,7 @@ WANTED = Response(None, Counts(1, ((2, 2),)))
 BAND = SearchSpec(omega=(0.7, 1.0))
 
 
+@pytest.mark.slow
 def test_a_stretch_ends_where_continuation_says() -> None:
     """A symmetric 1-2-2: the pitchfork below, and the fold or grazing above."""
     spec = replace(WANTED, symmetric=True)
@@ -35,6 +36,7 @@ def test_a_stretch_ends_where_continuation_says() -> None:
     assert exact.high.value * (1.0 - 2.0 * STEP) <= widest.high <= exact.high.value
 
 
+@pytest.mark.slow
 def test_every_place_shows_the_response() -> None:
     (found,) = stretches(MODEL, [replace(WANTED, b=(0.25, 0.27))], BAND)
     assert {s.b for s in found} == set(clearances(MODEL, replace(WANTED, b=(0.25, 0.27))))

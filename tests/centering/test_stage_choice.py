@@ -50,6 +50,7 @@ STIFF = system_text(
 """A stiff stop on one side: offsets and the leftover slope spoil the saturating stage."""
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("designs_are_made_once")
 def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its reason names both, and a study of other boards bears it out."""
@@ -80,6 +81,7 @@ def test_the_stage_is_taken_whose_boards_keep_the_response(monkeypatch: pytest.M
     assert kept["rectifier"] > kept["saturation"]
 
 
+@pytest.mark.slow
 def test_the_model_is_asked_once_for_both_stages(monkeypatch: pytest.MonkeyPatch) -> None:
     """And the parts are those of a stage that asks for itself, and those that another process
     helps to choose."""

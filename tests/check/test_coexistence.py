@@ -65,6 +65,7 @@ def settled(x: Array) -> tuple[str, Array] | None:
     return (response, strobes) if same and response != "none" else None
 
 
+@pytest.mark.slow
 def test_shares_are_those_of_a_plain_settling() -> None:
     count = 60
     (found,) = simulate(parse_model_file(SI), [OMEGA], starts=count)

@@ -148,6 +148,7 @@ def test_a_motion_over_few_pieces_is_told(capsys: pytest.CaptureFixture[str]) ->
     assert "coarse_range" not in fine
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("figures_are_blank")
 def test_a_circuit_of_it_says_so_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(design_files, "start_recipes", lambda made, *_: [None])

@@ -98,6 +98,7 @@ def test_depths_and_speeds_are_those_of_the_motion(
     assert f"{1e3 * one['upper']['depth']:.4g} mm {1e3 * one['upper']['speed']:.4g} mm/s" in said
 
 
+@pytest.mark.slow
 def test_without_a_period_it_is_what_many_periods_show() -> None:
     """A free motion on a torus: the ends of a long integration."""
     text = system_text(

@@ -66,6 +66,7 @@ def test_a_section_of_period_two_has_two_points_that_follow_each_other() -> None
     assert [float(row["x1"]) for row in rows[:2]] == points[:, 0].tolist()
 
 
+@pytest.mark.slow
 def test_chaos_has_a_long_record_and_readable_pictures() -> None:
     (found,) = simulation.simulate(parse_model_file(BASE), [1.25], traces=True, starts=1)
     assert found.record is not None

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from designer import parse_model_file, simulate
 from designer.verbs.simulate import tables
+from tests.shared.exploring import quick
 from tests.shared.system_text import system_text, table
 
 
@@ -77,15 +78,17 @@ def coulomb(
 
 @pytest.mark.parametrize(
     ("omega", "force", "mass", "static", "speed"),
-    [
-        (0.3, 0.2, 1.0, 0.2, 0.0),
-        (0.2, 0.5, 1.0, 0.5, 0.0),
-        (0.25, 0.3, 1.5, 0.3, 0.0),
-        (0.12, 0.2, 1.0, 0.2, 0.0),
-        (0.3, 0.2, 1.0, 0.3, 0.0),
-        (0.3, 0.3, 1.0, 0.3, 0.15),
-        (0.6, 0.2, 1.0, 0.2, 0.0),
-    ],
+    quick(
+        [
+            (0.3, 0.2, 1.0, 0.2, 0.0),
+            (0.2, 0.5, 1.0, 0.5, 0.0),
+            (0.25, 0.3, 1.5, 0.3, 0.0),
+            (0.12, 0.2, 1.0, 0.2, 0.0),
+            (0.3, 0.2, 1.0, 0.3, 0.0),
+            (0.3, 0.3, 1.0, 0.3, 0.15),
+            (0.6, 0.2, 1.0, 0.2, 0.0),
+        ]
+    ),
 )
 def test_phases_come_to_those_of_coulomb_s_law(
     omega: float, force: float, mass: float, static: float, speed: float

@@ -25,6 +25,7 @@ from designer.laws.force_law import ForceLaw
 from designer.model.clearance import Clearance, Side, combined
 from designer.model.mechanics import SecondOrderSystem
 from tests.shared.exact_circuits import STAGE, Scale, exact_circuit, unit_volts
+from tests.shared.exploring import seeds
 
 
 def random_system(seed: int) -> SecondOrderSystem:
@@ -204,7 +205,7 @@ def both_sided(system: SecondOrderSystem) -> frozenset[int]:
     return frozenset(i for i, zone in zones if len(zone.sides) == 2 and not zone.limits)
 
 
-@settings(max_examples=60)
+@settings(max_examples=len(seeds(8)))
 @given(seed=st.integers(0, 10**6), apart=st.booleans())
 def test_every_mode_has_the_model_s_matrices(seed: int, apart: bool) -> None:
     system = random_system(seed)
@@ -235,7 +236,7 @@ def test_every_mode_has_the_model_s_matrices(seed: int, apart: bool) -> None:
             assert row[-1] / unit == pytest.approx(theirs[side][-1], abs=1e-5)
 
 
-@settings(max_examples=40)
+@settings(max_examples=len(seeds(8)))
 @given(seed=st.integers(0, 10**6))
 def test_exact_values_have_no_error(seed: int) -> None:
     """Each kind of coefficient is counted, and none of an exact circuit has an error."""
@@ -262,7 +263,7 @@ def test_exact_values_have_no_error(seed: int) -> None:
         assert found.drive_gain == pytest.approx(wanted, rel=1e-7, abs=1e-9)
 
 
-@settings(max_examples=20)
+@settings(max_examples=len(seeds(8)))
 @given(seed=st.integers(0, 10**6), apart=st.booleans())
 def test_orbits_agree(seed: int, apart: bool) -> None:
     """Three periods from a common start, as long as no half is driven past where both drive; with
@@ -297,7 +298,7 @@ def test_orbits_agree(seed: int, apart: bool) -> None:
         assert ours.strobes / scale.volts == pytest.approx(theirs.strobes, abs=2e-4 * peak)
 
 
-@settings(max_examples=15)
+@settings(max_examples=len(seeds(5)))
 @given(seed=st.integers(0, 10**6))
 def test_how_far_unequal_halves_drive_their_output(seed: int) -> None:
     """The idle half's series diode conducts where ``idle_limits`` says, by the exact circuit."""
@@ -465,7 +466,7 @@ def test_of_boards_together_some_rest_open_and_some_against_a_stop() -> None:
     assert np.abs(resting_voltages(boards, ["v1"])[:, 0]) == pytest.approx(wanted, rel=1e-5)
 
 
-@settings(max_examples=10)
+@settings(max_examples=len(seeds(3)))
 @given(seed=st.integers(0, 10**6))
 def test_modes_that_some_boards_enter_are_those_of_all(seed: int) -> None:
     """Taken from many boards and added to, they are what those boards have for themselves."""

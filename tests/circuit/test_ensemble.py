@@ -23,6 +23,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.spread.spread import Spread, draw_many
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import EXACT, circuit_of
+from tests.shared.exploring import quick
 from tests.shared.stages import PAPER, rectifier, stage
 
 CIRCUIT = circuit_of(EXACT)
@@ -91,7 +92,7 @@ def test_it_is_each_board_alone() -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(STAGES))
-@pytest.mark.parametrize("p", sorted(OMEGA))
+@pytest.mark.parametrize("p", quick(sorted(OMEGA), 2))
 def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
     """Every verdict and every margin, against the general kernel and ``attractors.settle``."""
     indices = range(12)
@@ -137,6 +138,7 @@ def test_usual_boards_need_no_reduction_of_their_own(kind: str) -> None:
     assert len(boards._reductions) <= 4
 
 
+@pytest.mark.slow
 def test_where_chaos_is_not_plain_the_general_kernel_has_the_word(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -184,6 +186,7 @@ def raw(response: SettledBoard) -> tuple[bytes, ...]:
     return (*(a.tobytes() for a in (*arrays, numbers, response.trace)), o.multipliers.tobytes())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(STAGES))
 def test_a_board_s_bytes_do_not_depend_on_its_company(kind: str) -> None:
     """Alone, among others, in another order, by one thread or two: bit for bit the same."""

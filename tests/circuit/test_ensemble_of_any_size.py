@@ -109,6 +109,7 @@ def test_boards_with_a_mass_that_nothing_moves_are_served() -> None:
     assert not fast._reductions
 
 
+@pytest.mark.slow
 def test_boards_whose_states_move_together_are_served() -> None:
     made = synthesise(parse_model_file(TOGETHER))
     (first,) = checked_design.check(made.design, made.model_responses, None)

@@ -223,6 +223,7 @@ resistors = "E24"
 """
 
 
+@pytest.mark.slow
 def test_a_design_folder_of_duals_is_written_and_read_again(tmp_path: Path) -> None:
     """Four integrators and their inverters: four duals on the bill, in the deck and as read."""
     folder = quick_folder(LINEAR, tmp_path / "design")

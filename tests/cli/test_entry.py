@@ -5,6 +5,7 @@ from __future__ import annotations
 import _hashlib
 import csv
 import importlib
+import io
 import json
 import os
 import platform
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +30,10 @@ from designer.cli.command_line import application
 from designer.folders.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
 from designer.verbs.declared import GROUPS
-from designer.verdicts.cross_check import OWN_SAMPLES
+from tests.shared.blank_figures import blank_figures
+from tests.shared.exploring import quick
 from tests.shared.folder_contents import without_cost
+from tests.shared.made_once import made_once
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +41,7 @@ HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [
 BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 SMALL = BASE + WANTED
-SAMPLES = 12
+SAMPLES = 3
 
 
 def _process(*arguments: str | Path, **more: Any) -> subprocess.Popen[str]:
@@ -80,15 +84,27 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def finished(home: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A run with two workers that nobody disturbed, and what it printed."""
+    """A run that nobody disturbed, and what it printed."""
     out = home / "finished"
     model = _model(home, SMALL + COARSE_RECTIFIER)
-    arguments = ["run", str(model), "--out", str(out), "--samples", str(SAMPLES)]
+    arguments = ["run", str(model), "--out", str(out), "--samples", str(SAMPLES), "--jobs", "2"]
+    stdout, stderr = io.StringIO(), io.StringIO()
+    with redirect_stdout(stdout), redirect_stderr(stderr), blank_figures(), made_once():
+        status = entry.status([*arguments, "--json"])
+    assert status == 0, stderr.getvalue()
+    said = stdout.getvalue(), stderr.getvalue()
+    return out, subprocess.CompletedProcess(arguments, status, *said)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(home: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """The same run as a process, with everything that a user has."""
+    out = home / "undisturbed" / "finished"  # the report states the folder's name
+    arguments = ["run", str(home / "small.toml"), "--out", str(out), "--samples", str(SAMPLES)]
     process = _process(*arguments, "--jobs", "2", "--json")
     stdout, stderr = process.communicate(timeout=300)
-    done = subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
-    assert done.returncode == 0, stderr
-    return out, done
+    assert process.returncode == 0, stderr
+    return out, subprocess.CompletedProcess(arguments, 0, stdout, stderr)
 
 
 # ---------------------------------------------------------------------------------------------
@@ -164,10 +180,22 @@ def test_run_prints_one_object_and_nothing_else(
     assert set(counted) == {"ok", "lost", "grazing", "failed", "samples", "low", "high"}
     assert counted["samples"] == SAMPLES
     assert counted["ok"] + counted["lost"] + counted["grazing"] + counted["failed"] == SAMPLES
-    assert response["agreement"]["asked"] >= OWN_SAMPLES
+    assert response["agreement"]["asked"] == SAMPLES
     assert response["agreement"]["nominal_start"]["asked"] == SAMPLES
     assert "Traceback" not in done.stderr
     assert out.is_dir()
+
+
+@pytest.mark.slow
+def test_a_process_prints_the_same_and_nothing_else(
+    finished: tuple[Path, subprocess.CompletedProcess[str]],
+    undisturbed: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
+    answers = [_strict(done.stdout) for _, done in (finished, undisturbed)]
+    same = ("parts", "errors", "responses")
+    assert {key: answers[0][key] for key in same} == {key: answers[1][key] for key in same}
+    assert answers[0].keys() == answers[1].keys()
+    assert "Traceback" not in undisturbed[1].stderr
 
 
 def test_folder_holds_what_the_contract_says(
@@ -283,6 +311,7 @@ def test_same_inputs_are_not_computed_again(
     assert _tree(out) == before
 
 
+@pytest.mark.slow
 def test_overwrite_replaces_listed_files_only(
     finished: tuple[Path, subprocess.CompletedProcess[str]],
     tmp_path: Path,
@@ -294,12 +323,12 @@ def test_overwrite_replaces_listed_files_only(
     for name in ("notes.txt", "samples.parquet/mine.parquet"):
         (out / name).write_text("mine")
     before = _tree(out)
-    fewer = ["tolerance", str(out), "--samples", "10", "--rung", "exact", "--no-blame", "-q"]
+    fewer = ["tolerance", str(out), "--samples", "2", "--rung", "exact", "--no-blame", "-q"]
     _refused(fewer, capfd, "manifest.json", f"samples {SAMPLES}", "--overwrite")
     _refused([*fewer, "--resume"], capfd, "manifest.json", "--overwrite")
     assert _tree(out) == before
     assert entry.status([*fewer, "--overwrite", "--json"]) == 0
-    assert _strict(capfd.readouterr().out)["responses"][0]["yield"]["samples"] == 10
+    assert _strict(capfd.readouterr().out)["responses"][0]["yield"]["samples"] == 2
     after = _tree(out)
     assert {n for n in after if n.startswith("samples")} == {
         "samples.parquet/block-000000.parquet",
@@ -330,6 +359,7 @@ def test_a_model_that_was_changed_in_its_folder(
     assert _tree(out) == before
 
 
+@pytest.mark.slow
 def test_fidelities_of_op_amps_in_ngspice(
     finished: tuple[Path, subprocess.CompletedProcess[str]], capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -388,6 +418,7 @@ def test_a_response_that_is_not_there_is_exit_1(
         assert entry.status(["synthesise", str(model), "--out", str(out), "-q"]) == 1
 
 
+@pytest.mark.slow
 def test_synthesis_without_responses_or_stops(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -619,20 +650,21 @@ def test_folders_that_cannot_be_written(tmp_path: Path, capfd: pytest.CaptureFix
     assert _tree(foreign) == {"bom.csv": b"mine"}
 
 
-def test_missing_ngspice_is_exit_3(tmp_path: Path) -> None:
+def test_missing_ngspice_is_exit_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
-    environment = {**os.environ, "PATH": str(tmp_path), "PYTHONPATH": str(ROOT)}
-    process = _process("run", _model(tmp_path), "--out", out, "--json", env=environment)
-    stdout, stderr = process.communicate(timeout=60)
-    assert process.returncode == 3
-    assert stdout == ""
-    assert "apt-get install" in stderr
-    assert "Traceback" not in stderr
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert entry.status(["run", str(_model(tmp_path)), "--out", str(out), "--json"]) == 3
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert "apt-get install" in said.err
+    assert "Traceback" not in said.err
     assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    "what", ["too old", "no library", "another library", "a library that crashes"]
+    "what", quick(["too old", "no library", "another library", "a library that crashes"])
 )
 def test_an_ngspice_that_will_not_do_is_exit_3(tmp_path: Path, what: str) -> None:
     """Clear, before any long work, and nothing is written."""
@@ -709,12 +741,12 @@ def test_a_defect_of_the_tool_s_own_is_no_missing_library(
 
 @pytest.mark.slow
 def test_killed_study_goes_on_and_ends_the_same(
-    finished: tuple[Path, subprocess.CompletedProcess[str]],
+    undisturbed: tuple[Path, subprocess.CompletedProcess[str]],
     home: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    whole, done = finished
-    out = home / "killed" / whole.name  # the report states the folder's name
+    whole, done = undisturbed
+    out = home / "killed" / whole.name
     arguments = ["run", str(home / "small.toml"), "--out", str(out), "--samples", str(SAMPLES)]
     process = _process(*arguments, "--jobs", "1")
     _wait_for(out / "samples.parquet" / "block-000000.parquet", process)

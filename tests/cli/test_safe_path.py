@@ -62,6 +62,7 @@ def call(folder: Path, *words: str, **variables: str) -> subprocess.CompletedPro
     )
 
 
+@pytest.mark.slow
 def test_workers_of_the_command(folder: Path) -> None:
     done = call(
         folder,
@@ -71,6 +72,7 @@ def test_workers_of_the_command(folder: Path) -> None:
     assert (done.returncode, ran(folder)) == (0, ""), done.stderr
 
 
+@pytest.mark.slow
 def test_python_m(folder: Path) -> None:
     for name in BEFORE:
         (folder / f"{name}.py").unlink()

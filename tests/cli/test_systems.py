@@ -95,6 +95,7 @@ def test_displacements_are_absolute_where_the_base_moves(file: str, capfd: Captu
 ACCELERATED = SHAKEN.replace('"3 mm"', '"14 m/s²"')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [ACCELERATED], indirect=True)
 def test_displacements_from_a_base_of_given_acceleration(
     file: str, tmp_path: Path, capfd: Captured
@@ -125,6 +126,7 @@ def test_displacements_from_a_base_of_given_acceleration(
         assert text in drawn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [CHAIN], indirect=True)
 def test_several_masses_and_clearances(file: str, capfd: Captured, tmp_path: Path) -> None:
     plots = tmp_path / "plots"

@@ -33,6 +33,7 @@ from designer.design_rules.kicad_program import KicadFailed
 from designer.folders import kicad_files
 from designer.jobs import rules_job
 from tests.circuit.test_reduction import EXACT
+from tests.shared.exploring import quick
 from tests.shared.rule_cases import base, generic
 from tests.shared.stages import stage
 
@@ -163,6 +164,7 @@ def test_the_exported_board_is_of_its_design(tmp_path: Path) -> None:
         assert footprint.courtyard
 
 
+@pytest.mark.slow
 def test_a_board_of_another_design_is_told_apart(tmp_path: Path) -> None:
     saturating = replace(base().synthesis, design=replace(base().synthesis.design, circuit=stage(
         "saturation", "both", {n: v if n[0] == "C" else 10e3 for n, v in EXACT.items()}
@@ -409,7 +411,9 @@ def at_edge(gap: float, folder: Path, name: str = "R4", side: str = "right") -> 
     return by_reading(shifted(name, by), folder)["board-outline"]
 
 
-@pytest.mark.parametrize(("name", "side"), [("R4", "right"), ("C903", "top"), ("U1", "right")])
+@pytest.mark.parametrize(
+    ("name", "side"), quick([("R4", "right"), ("C903", "top"), ("U1", "right")])
+)
 def test_a_part_past_the_edge_is_caught_and_a_near_miss_is_not(
     tmp_path: Path, name: str, side: str
 ) -> None:

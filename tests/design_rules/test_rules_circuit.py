@@ -358,6 +358,7 @@ def test_offsets_that_are_too_large_name_the_op_amps_that_keep_the_rule() -> Non
     assert found.do.startswith("no op-amp of the catalogue has so little offset")
 
 
+@pytest.mark.slow
 def test_each_clearance_has_shifts_of_its_own() -> None:
     """Three masses with a clearance to ground and one between two masses: an offset moves either
     as far as the reduction says, and the rules name the clearance."""

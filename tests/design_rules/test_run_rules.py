@@ -39,6 +39,7 @@ from designer.verbs.rules import rules
 from tests.cli.test_entry import _tree
 from tests.design_rules import test_rules_board
 from tests.shared import rule_cases
+from tests.shared.exploring import quick
 from tests.shared.rule_cases import TEXT, base
 from tests.shared.stages import CATALOG
 
@@ -298,7 +299,7 @@ def test_bad_input_writes_nothing(
     assert _tree(design) == before
 
 
-@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("before", quick([False, True]))
 def test_a_folder_that_cannot_be_written_is_judged_all_the_same(
     design: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], before: bool
 ) -> None:

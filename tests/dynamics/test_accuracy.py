@@ -20,17 +20,14 @@ from designer.dynamics.flow_result import FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
+from tests.shared.exploring import quick
 from tests.shared.oracles import Plain, integrate
 
 PERIODS = 10
 """The paper's high responses have sixteen impacts in each; over more periods chaotic cases grow too
 sensitive to compare."""
 START = np.array([0.1, -0.2, 0.05, 0.3])
-SLOW = pytest.mark.slow
-PAPER = (
-    1.55, 1.43, 0.85, 0.41, 0.215,
-    *(pytest.param(omega, marks=SLOW) for omega in (0.54, 0.337, 0.284, 0.24)),
-)  # fmt: skip
+PAPER = quick((1.55, 1.43, 0.85, 0.41, 0.215, 0.54, 0.337, 0.284, 0.24), 3)
 ONE_P_P = (1.55, 0.85, 0.54, 0.41, 0.337, 0.284, 0.24, 0.215)
 """Frequencies of the 1-p-p responses, p = 1 … 8."""
 
@@ -64,6 +61,7 @@ def test_paper(omega: float) -> None:
         np.testing.assert_array_equal(counts, exact.impacts)
 
 
+@pytest.mark.slow
 def test_references_agree() -> None:
     """The 40-digit flow against DOP853 restarted at every event, which shares no code with it."""
     for problem in (Problem(0.85), Problem(1.2, lower=False), Problem(0.9, k0=0.0, f20=0.4)):

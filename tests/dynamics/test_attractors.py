@@ -120,6 +120,7 @@ def test_orbit_repeats_in_the_reference_integrator() -> None:
         assert truth.sides.tolist() == orbit.impact_sides.tolist()
 
 
+@pytest.mark.slow
 def test_a_long_period_is_found_and_repeats_in_the_reference_integrator() -> None:
     omega = 0.625734293717487
     orbit = settle(flow_at(omega), REST)
@@ -206,6 +207,7 @@ def agree_with_brute(cases: int, seed: int) -> tuple[int, list[str]]:
     return decided, wrong
 
 
+@pytest.mark.slow
 def test_settling_agrees_with_brute_settling() -> None:
     decided, wrong = agree_with_brute(40, 1)
     assert decided >= 36
@@ -310,6 +312,7 @@ def test_mirrored_strobes_of_a_period_three_orbit() -> None:
     assert step == pytest.approx(strobes[1], abs=1e-7)
 
 
+@pytest.mark.slow
 def test_an_exact_twin_is_found_whichever_of_the_two_is_met_first() -> None:
     omega = 0.6789473684210526
     model = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)
@@ -442,6 +445,7 @@ def test_frequencies_beyond_the_engine_are_refused_by_every_verb(omega: float) -
         find(model, [Response(omega=omega)])
 
 
+@pytest.mark.slow
 def test_the_exponent_is_the_divergence_of_two_trajectories() -> None:
     """Benettin's method: a second trajectory 1e-7 away, brought back every period."""
     flow = flow_at(1.2)

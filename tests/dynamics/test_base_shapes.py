@@ -18,6 +18,7 @@ from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from designer.model.relative_motion import companion_motions, ground_of
 from designer.plots.system_equations import equations_of
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 
 GROUNDED = ("a", "ground")
@@ -43,7 +44,7 @@ def base(keys: str, amplitude: str = "0.3") -> str:
     return f"[base]\namplitude = {amplitude}\n{keys}\n"
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", quick(SHAPES))
 @pytest.mark.parametrize("stop", ["", STOP, FIXED])
 def test_the_absolute_motion_is_another_integrators(shape: str, stop: str) -> None:
     """m x″ + c (x − y)′ + k (x − y) + stop(x − y) = 0 in absolute x, with y as the file says; of a
@@ -92,7 +93,7 @@ def test_the_absolute_motion_is_another_integrators(shape: str, stop: str) -> No
         assert shown[:, 1] == pytest.approx(np.interp(at, times, other[1]), abs=1e-4)
 
 
-@pytest.mark.parametrize("stays", [True, False])
+@pytest.mark.parametrize("stays", quick([True, False]))
 def test_a_force_whose_cosine_the_base_cancels_at_one_frequency_is_kept_at_others(
     stays: bool,
 ) -> None:

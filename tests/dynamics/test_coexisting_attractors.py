@@ -91,6 +91,7 @@ def test_the_attractors_of_many_starts_have_no_transient_among_them() -> None:
     assert [o.response for o in coexisting(flow, starts(SCALE, 16))] == ["1-1-1"]
 
 
+@pytest.mark.slow
 def test_an_exponent_measured_over_the_end_of_chaos_is_of_no_chaos() -> None:
     flow = flow_at(TRANSIENT)
     orbit = chaotic_starts(flow, 6)[0]

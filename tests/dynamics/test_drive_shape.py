@@ -33,6 +33,7 @@ SHAPES = st.lists(
 TURNS = np.linspace(0.0, 2.0 * np.pi, 200_001)
 
 
+@pytest.mark.slow
 @given(SHAPES)
 def test_extremes_are_those_of_a_fine_sample(shape: Shape) -> None:
     wave = drive_shape.wave(shape, TURNS)

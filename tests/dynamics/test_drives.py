@@ -23,6 +23,7 @@ from designer.model.driven import model_flow
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.relative_motion import ground_of
 from designer.model.waveforms import Waveform, series
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 
 GROUNDED = ("a", "ground")
@@ -80,7 +81,8 @@ def by_newton(
     return np.asarray(found.y.T)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 4, 5])  # with harmonics and without, base and none
+# With harmonics and without, base and none.
+@pytest.mark.parametrize("seed", quick([0, 1, 2, 4, 5]))
 def test_any_phases_and_harmonics_against_a_tight_integrator(seed: int) -> None:
     text, waves, base, omega = drawn(seed)
     model = parse_model_file(text).model
@@ -94,7 +96,7 @@ def test_any_phases_and_harmonics_against_a_tight_integrator(seed: int) -> None:
     assert flow.kernel == "tabulated"
 
 
-@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("seed", quick([1, 4]))
 def test_turning_points_and_absolute_extremes_of_an_orbit(seed: int) -> None:
     text, waves, base, omega = drawn(seed)
     model = parse_model_file(text).model
@@ -126,6 +128,7 @@ def test_a_phase_of_the_only_force_shifts_the_motion() -> None:
     np.testing.assert_allclose(one, other, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_bifurcations_do_not_depend_on_the_phase_of_the_only_force(tmp_path: Path) -> None:
     points = []
     for phase in (None, 0.7):

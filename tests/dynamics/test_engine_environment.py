@@ -23,6 +23,7 @@ from designer.base.threads import interrupt, parallel
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
+from tests.shared.exploring import quick
 from tests.shared.model_text import PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -130,6 +131,7 @@ def test_nowhere_to_write_compiled_code(tmp_path: Path) -> None:
     assert (package / "designer" / "__pycache__").is_file()
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_compiling(tmp_path: Path) -> None:
     process = _start(tmp_path, "--omega", "1.43", NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     _interrupt(process, COMPILING, 1.0)
@@ -170,7 +172,7 @@ def test_ctrl_c_that_was_cleared_is_raised_by_the_next_compilation() -> None:
         work()
 
 
-@pytest.mark.parametrize("engine", ["model", "circuit"])
+@pytest.mark.parametrize("engine", quick(["model", "circuit"]))
 def test_ctrl_c_in_a_long_run(tmp_path: Path, engine: str) -> None:
     slow = [f"--omega={0.002 + 1e-5 * i}" for i in range(400)]
     # The kernels have to be there, or it is the compiler that is stopped.

@@ -17,6 +17,7 @@ from designer.dynamics.piecewise_linear import Drive, Guard, Mode, ModeKey, Piec
 from designer.model.clearance import Clearance
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
+from tests.shared.exploring import quick
 from tests.shared.oracles import Plain, brute_flow, integrate, response_amplitude
 
 PAPER = Plain(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
@@ -71,7 +72,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("p", "omega", "periods"), CASES)
+@pytest.mark.parametrize(("p", "omega", "periods"), quick(CASES, 2))
 def test_trajectory_is_that_of_dop853(p: Plain, omega: float, periods: int) -> None:
     """State after many periods, every impact's time, velocity and side."""
     truth = integrate(p, omega, list(START), periods)
@@ -266,6 +267,7 @@ def random_chain(rng: np.random.Generator, masses: int, stops: int) -> Piecewise
     ).piecewise_linear()
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 10**6), masses=st.integers(1, 3), stops=st.integers(1, 3))
 def test_chains_with_several_clearances(seed: int, masses: int, stops: int) -> None:
@@ -306,6 +308,7 @@ def random_limiter(rng: np.random.Generator, n: int) -> PiecewiseLinearSystem:
     return PiecewiseLinearSystem(tuple(f"x{i}" for i in range(n)), build, (0,), (), (), ())
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), n=st.sampled_from((2, 4, 6)))
 def test_limiters_that_see_the_drive(seed: int, n: int) -> None:

@@ -16,7 +16,7 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.driven import model_flow
 from designer.model.model_file import parse_model_file
 from tests.model.test_force_law import straight_on
-from tests.shared.exploring import seeds
+from tests.shared.exploring import quick, seeds
 from tests.shared.system_text import clearance, system_text, table
 
 Law = tuple[tuple[float, ...], bool, tuple[tuple[float, float], ...]]
@@ -74,7 +74,7 @@ def drawn(seed: int) -> tuple[str, list[Law], dict[str, Array], float]:
     return text, laws, matrices, omega
 
 
-@pytest.mark.parametrize("seed", seeds(6))
+@pytest.mark.parametrize("seed", quick(seeds(6)))
 def test_laws_of_any_shape_against_a_tight_integrator(seed: int) -> None:
     """Newton's law with the force looked up piece by piece, DOP853 in short steps."""
     text, laws, matrices, omega = drawn(seed)

@@ -30,6 +30,7 @@ from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.model.swept_tables import ModalBatch
 from tests.dynamics.test_modal_tables import PAPER, cases
+from tests.shared.exploring import quick
 from tests.shared.oracles import Plain
 from tests.shared.system_text import clearance, system_text, table
 
@@ -123,7 +124,7 @@ def test_linear_algebra_of_size_four(seed: int) -> None:
     assert factor(np.ones((4, 4)), order) == 0.0
 
 
-@pytest.mark.parametrize("omega", [1.55, 0.85, 0.54, 0.215, 1.0, 0.6])
+@pytest.mark.parametrize("omega", quick([1.55, 0.85, 0.54, 0.215, 1.0, 0.6]))
 def test_least_displacement_and_exponent_against_integration(omega: float) -> None:
     """One period from an arbitrary point of the attractor, chaotic ones too."""
     x = setting(omega).steady(np.zeros(4), TransientSettings(100, 16, 0)).end
@@ -192,6 +193,7 @@ def test_long_periods_are_found_by_both_engines(omega: float) -> None:
     assert hurried.status is OrbitStatus.NOT_SETTLED
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.12, 1.8))
 def test_names_what_settling_names(omega: float) -> None:
@@ -257,6 +259,7 @@ def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(got.velocities, run.impacts.state[shown, 1], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_chaos_that_fades_while_its_exponent_is_taken_is_a_transient() -> None:
     """Beyond the grazing of its linear orbit a press is chaotic for hundreds of periods, then
     settles on that orbit, whose closed form is the oscillator's steady state."""

@@ -17,6 +17,7 @@ FILE = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_RECTIFIER}")
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 
 
+@pytest.mark.slow
 def test_the_parts_and_the_yield_are_those_of_the_verbs() -> None:
     messages = list(board_box(FILE, read_place(FILE, {"omega": 0.85}), "1-2-2", choose))
     rows = dict(messages[1]["rows"])
@@ -50,6 +51,7 @@ def test_what_no_circuit_makes_is_said() -> None:
         expected(None)
 
 
+@pytest.mark.slow
 def test_parts_are_chosen_in_a_process_of_their_own() -> None:
     process = PartsProcess()
     process.close()  # one that was never asked

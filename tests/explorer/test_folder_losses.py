@@ -20,6 +20,7 @@ from designer.yields.rare_losses import LossRegion, RareLosses, ToleranceMargin
 from tests.explorer.opened_page import chromium, opened
 from tests.explorer.served import served
 from tests.shared.model_text import SMALL
+from tests.shared.quick_folders import without_starts
 
 pytestmark = pytest.mark.usefixtures("designs_are_made_once")
 
@@ -59,6 +60,7 @@ def made(place: Path, *options: str) -> Path:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("designer.yields.tolerance_study.rare_losses", known)
         patched.setattr("designer.report.write.write_report", report)
+        without_starts(patched)
         assert entry.status([*command, "--no-blame", "--seed", "3", *options]) == 0
     return place
 
@@ -102,6 +104,7 @@ def test_figures_of_a_folder_stand_on_its_page(whole: Path) -> None:
     assert "Boards of a million" not in page(model_of(whole))
 
 
+@pytest.mark.slow
 def test_without_a_finished_estimate_of_this_model_nothing_is_said(
     folder: Path, tmp_path: Path
 ) -> None:
@@ -117,6 +120,7 @@ def test_without_a_finished_estimate_of_this_model_nothing_is_said(
     assert folder_losses(model_of(folder), pytest.fail) is None
 
 
+@pytest.mark.slow
 def test_a_study_that_cannot_be_read_is_noted_and_done_without(
     folder: Path, tmp_path: Path
 ) -> None:

@@ -217,6 +217,7 @@ def test_a_job_without_a_wanted_response_is_refused_before_anything_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_job_has_a_folder_of_its_own_and_says_how_it_ended(tmp_path: Path) -> None:
     """A file that asks for what cannot be: the process ends with status 2 and its message."""
     path = tmp_path / "mine.toml"

@@ -36,6 +36,7 @@ pytestmark = pytest.mark.usefixtures("designs_are_made_once")
 TEXT = (Path(__file__).resolve().parents[2] / "examples" / "rectifier.toml").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_every_response_has_a_start() -> None:
     head, rest = TEXT.split("[[response]]", 1)
     circuit = rest[rest.index("[circuit]") :]

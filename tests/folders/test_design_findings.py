@@ -32,6 +32,7 @@ def test_a_design_that_keeps_everything_has_no_finding() -> None:
     assert findings(base().synthesis, base()) == {"warnings": [], "failed_rules": []}
 
 
+@pytest.mark.slow
 def test_the_rules_that_fail_are_those_of_the_verb() -> None:
     """No circuit for this model stays below a volt."""
     made = replace(base().synthesis, modelfile=parse_model_file(TEXT + LOW_SWING))
@@ -62,6 +63,7 @@ def test_a_folder_of_an_earlier_version_is_judged_when_it_is_asked(tmp_path: Pat
     assert (answer["warnings"], answer["failed_rules"]) == ([], [])
 
 
+@pytest.mark.slow
 def test_a_design_is_told_first_and_its_files_are_there_before_its_starts(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_design_is_told_first_and_its_files_are_there_before_its_starts(
     assert any("design rule" in text for text in answer["warnings"])
 
 
+@pytest.mark.slow
 def test_starts_that_are_interrupted_are_sought_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,6 +31,7 @@ from designer.verdicts.ngspice_runs import cross_checks
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study
 from designer.yields.study_plan import plan_study
+from tests.shared.exploring import quick
 from tests.shared.quick_folders import without_starts
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
@@ -110,7 +111,7 @@ def test_the_deck_runs_in_plain_ngspice(
     assert "aborted" not in done.stderr
 
 
-@pytest.mark.parametrize("name", ["rectifier", "upper half", "saturation, lower"])
+@pytest.mark.parametrize("name", quick(["rectifier", "upper half", "saturation, lower"]))
 def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     """Every engine shows the same response; the report names the stage's parts."""
     first = made(name, tmp_path)

@@ -13,11 +13,10 @@ from random import Random
 import pytest
 
 from designer.cli import entry
-from tests.jobs.test_damaged_folder import BLOCK, EXACT, MODEL
+from tests.jobs.test_damaged_folder import BLOCK
 from tests.shared.damaged import cells_swapped, damaged, json_of, swapped
-from tests.shared.exploring import EXPLORING
-from tests.shared.model_text import COARSE_RECTIFIER
-from tests.shared.quick_folders import quick_folder
+from tests.shared.exploring import EXPLORING, quick
+from tests.shared.quick_folders import EXACT, studied_folder
 from tests.shared.stopped_work import work_stopped
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -49,9 +48,7 @@ FEW, MANY, EACH = 4, 7 if EXPLORING else 5, 100
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a design and a study."""
-    out = quick_folder(MODEL + COARSE_RECTIFIER, tmp_path_factory.mktemp("fuzzed") / "design")
-    assert entry.status(["tolerance", str(out), *EXACT, "-q"]) in (0, 1)
-    return out
+    return studied_folder(tmp_path_factory.mktemp("fuzzed") / "design")
 
 
 @pytest.fixture
@@ -80,9 +77,7 @@ def vouched(folder: Path, name: str) -> None:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(
-    "run", [*range(FEW), *(pytest.param(n, marks=pytest.mark.slow) for n in range(FEW, MANY))]
-)
+@pytest.mark.parametrize("run", quick(range(MANY), FEW))
 @pytest.mark.usefixtures("work_begins")
 def test_a_verb_reads_a_damaged_folder_or_names_it(
     run: int, finished: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]

@@ -29,9 +29,8 @@ from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tole
 from designer.spice import opamp_check
 from designer.spice.pool import SpicePool
 from designer.verbs.declared import Verb, Word
-from tests.jobs.test_damaged_folder import MODEL
-from tests.shared.exploring import EXPLORING
-from tests.shared.model_text import COARSE_RECTIFIER
+from tests.shared.exploring import EXPLORING, quick
+from tests.shared.model_text import SMALL
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stopped_work import work_stopped
 
@@ -75,7 +74,7 @@ SOUND = {
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a design folder in it."""
     place = tmp_path_factory.mktemp("options")
-    quick_folder(MODEL + COARSE_RECTIFIER, place / "design")
+    quick_folder(SMALL, place / "design")
     return place
 
 
@@ -85,7 +84,7 @@ def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     place = tmp_path / "above" / "here"
     shutil.copytree(made, place)
     (place / "folder").mkdir()
-    (place / "model.toml").write_text(MODEL + COARSE_RECTIFIER, encoding="utf-8")
+    (place / "model.toml").write_text(SMALL, encoding="utf-8")
     (place / "full").symlink_to("/dev/full")
     (place / "loop").symlink_to("loop")
     (place / "link").symlink_to("design")
@@ -185,7 +184,7 @@ def run(line: Sequence[str], capfd: pytest.CaptureFixture[str]) -> tuple[int, st
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     "number",
-    [*range(FEW), *(pytest.param(n, marks=pytest.mark.slow) for n in range(FEW, FEW + MANY))],
+    quick(range(FEW + MANY), FEW),
 )
 @pytest.mark.usefixtures("work_begins")
 def test_words_that_nobody_means_are_answered_or_refused(

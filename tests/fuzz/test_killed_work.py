@@ -25,12 +25,11 @@ from designer.cli import entry
 from designer.folders import design_source
 from designer.jobs import bench_job
 from tests.jobs.test_bench_job import csv_of
-from tests.jobs.test_damaged_folder import EXACT, MODEL
 from tests.shared.exploring import EXPLORING
 from tests.shared.folder_contents import differing
-from tests.shared.model_text import COARSE_RECTIFIER
+from tests.shared.model_text import SMALL
 from tests.shared.paper_cases import synthesised
-from tests.shared.quick_folders import quick_folder
+from tests.shared.quick_folders import EXACT, quick_folder
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -68,7 +67,7 @@ class Killed(BaseException):
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a design."""
     place = tmp_path_factory.mktemp("killed")
-    return quick_folder(MODEL + COARSE_RECTIFIER, place / "design")
+    return quick_folder(SMALL, place / "design")
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from designer.model.mechanics import frequency_range
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.synthesis import parts_choice
 from tests.shared.damaged import toml_of
-from tests.shared.exploring import EXPLORING
+from tests.shared.exploring import EXPLORING, quick
 
 EACH = 10
 """Files of one run."""
@@ -247,7 +247,7 @@ def test_a_motion_that_no_flow_follows_has_the_drive_s_own_frequency() -> None:
 @pytest.mark.usefixtures("short_work")
 @pytest.mark.parametrize(
     "number",
-    [*range(FEW), *(pytest.param(n, marks=pytest.mark.slow) for n in range(FEW, FEW + MANY))],
+    quick(range(FEW + MANY), FEW),
 )
 def test_any_model_is_simulated_and_designed_or_refused(number: int) -> None:
     catalog, sound = load_catalog(), 0

@@ -17,6 +17,7 @@ from designer.folders import design_source
 from designer.jobs import bench_job
 from designer.verbs.bench import bench, channels_of
 from designer.workbench import naming
+from tests.shared.exploring import quick
 from tests.shared.paper_cases import synthesised
 from tests.shared.typed_answers import check_type
 from tests.workbench.stored_records import stored
@@ -42,6 +43,7 @@ def csv_of(number: int, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_records_are_named_and_laid_over_the_orbit(folder: Path, tmp_path: Path) -> None:
     files = [csv_of(2, tmp_path / "a.csv"), csv_of(8, tmp_path / "b.csv")]
     out = tmp_path / "board"
@@ -118,7 +120,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), EnvironmentMissing("no ngspice")])
+@pytest.mark.parametrize("error", quick([KeyboardInterrupt(), EnvironmentMissing("no ngspice")]))
 def test_what_stands_before_ngspice_is_kept(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:

@@ -17,21 +17,18 @@ import pytest
 from designer.base.design_folder import Folder
 from designer.base.seal import BLANK, MARK
 from designer.cli import entry as cli
-from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
-from tests.shared.quick_folders import quick_folder
+from tests.shared.exploring import quick
+from tests.shared.quick_folders import EXACT, STUDY, studied_folder
 from tests.shared.stopped_work import work_stopped
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
-MODEL = "format = 1\n" + PAPER_TABLE + '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
-STUDY = ["--samples", "6", "--jobs", "1"]
-EXACT = [*STUDY, "--rung", "exact"]
 BLOCK = "samples.parquet/block-000000.parquet"
 VERBS = {
-    "run": ["run", "{}", *STUDY],
     "tolerance": ["tolerance", "{}", *EXACT],
-    "another layer": ["tolerance", "{}", *EXACT, "--map", "grade"],
     "export": ["export", "{}"],
+    "run": ["run", "{}", *STUDY],
+    "another layer": ["tolerance", "{}", *EXACT, "--map", "grade"],
     "rules": ["rules", "{}"],
     "simulate": ["simulate", "{}", "--omega", "0.85", "--engine", "circuit", "--starts", "1"],
     "bifurcation": ["bifurcation", "{}", "--circuit", "--from", "1", "--to", "0.9", "--steps", "3"],
@@ -55,8 +52,7 @@ def words(verb: str, folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    out = quick_folder(MODEL + COARSE_RECTIFIER, tmp_path_factory.mktemp("whole") / "design")
-    assert cli.status([*words("tolerance", out), "-q"]) in (0, 1)
+    out = studied_folder(tmp_path_factory.mktemp("whole") / "design")
     return Finished(out, json.loads((out / "tolerance.json").read_text()))
 
 
@@ -79,7 +75,7 @@ def damaged(content: bytes, name: str) -> Iterator[bytes | None]:
     yield None
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", quick(VERBS, 2))
 @pytest.mark.usefixtures("work_begins")
 def test_a_cut_off_file_is_named(
     verb: str, finished: Finished, copied: Path, capfd: pytest.CaptureFixture[str]

@@ -43,6 +43,7 @@ def _store(root: Path, p: StudyPlan) -> BlockStore[Answer]:
     return BlockStore(root, "samples.parquet", Answer, study_hash(p), size=4)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_equal_files(address: str, tmp_path: Path) -> None:
     p = plan(22)
     for name in ("here", "there"):
@@ -79,6 +80,7 @@ class Deadly:
         return [self.number]
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_loses_nothing(address: str, tmp_path: Path) -> None:
     marker = tmp_path / "killed"
     with Cluster(address) as there:
@@ -111,6 +113,7 @@ def test_a_scheduler_that_dies_is_said() -> None:
                 pass
 
 
+@pytest.mark.slow
 def test_nobody_at_the_address(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +138,7 @@ def test_a_scheduler_without_workers(monkeypatch: pytest.MonkeyPatch) -> None:
         Cluster(empty.scheduler_address)
 
 
+@pytest.mark.slow
 def test_workers_with_other_rules_are_refused(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

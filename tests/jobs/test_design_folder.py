@@ -26,6 +26,7 @@ from designer.cli import entry
 from designer.folders import design_files
 from designer.folders.design_source import read_design
 from designer.model.model_file import read_model_file
+from tests.shared.exploring import quick
 from tests.shared.model_text import COARSE_RECTIFIER, PAPER_TABLE
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts
@@ -230,7 +231,7 @@ def copied(paper: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(paper, tmp_path / "copied"))
 
 
-@pytest.mark.parametrize("example", ["paper.toml", "drill.toml"])
+@pytest.mark.parametrize("example", quick(["paper.toml", "drill.toml"]))
 def test_a_design_is_read_back_as_it_was_made(
     tmp_path: Path, copied: Path, example: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -293,6 +294,7 @@ def test_json_is_strict() -> None:
         dumps({"a": object()})
 
 
+@pytest.mark.slow
 def test_files_stand_before_what_takes_longer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

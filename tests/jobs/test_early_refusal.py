@@ -22,6 +22,7 @@ from designer.model.model_file import ModelFile, parse_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.part_checks import check_choices
 from tests.catalog.test_catalog import SHIPPED
+from tests.shared.exploring import quick
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.stages import CATALOG, PAPER
 
@@ -204,7 +205,7 @@ def test_the_verbs_refuse_before_any_work(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("verb", ["synthesise", "run", "tolerance", "trade", "search"])
+@pytest.mark.parametrize("verb", quick(["synthesise", "run", "tolerance", "trade", "search"], 2))
 @pytest.mark.parametrize(
     ("wanted", "instead"),
     [('"1-9-9"', "1-3-3"), ('"1-3-3"\nsymmetric = false', "1-3-3, symmetric")],

@@ -18,6 +18,7 @@ from designer.folders import design_source
 from designer.folders.design_source import read_design
 from designer.jobs import stage_runner, study_job
 from designer.jobs.study_stage import Place, read_study
+from tests.shared.exploring import quick
 from tests.shared.stopped_work import work_stopped
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -105,7 +106,7 @@ def test_the_design_and_the_rows_are_those_that_were_written(stored: Path) -> No
     ]
 
 
-@pytest.mark.parametrize("verb", [*VERBS, *ANEW])
+@pytest.mark.parametrize("verb", quick([*VERBS, *ANEW], 3))
 @pytest.mark.usefixtures("later")
 def test_every_verb_reads_it(
     verb: str, begun: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]

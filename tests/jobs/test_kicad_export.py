@@ -23,6 +23,7 @@ from designer.cli import entry
 from designer.folders import kicad_files
 from designer.schematic.kicad_project import Project
 from tests.catalog.test_catalog import own_opamp
+from tests.shared.exploring import quick
 from tests.shared.paper_cases import PAPER
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -108,7 +109,7 @@ def test_the_same_model_makes_the_same_project_elsewhere(made: Path, tmp_path: P
     assert one == other
 
 
-@pytest.mark.parametrize("begun", [False, True])
+@pytest.mark.parametrize("begun", quick([False, True]))
 def test_a_design_interrupted_at_its_project_gets_one(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begun: bool
 ) -> None:
@@ -156,6 +157,7 @@ def test_an_edited_board_is_kept_until_it_is_to_be_replaced(made: Path) -> None:
         board.write_bytes(written)
 
 
+@pytest.mark.slow
 def test_a_folder_made_with_another_catalogue(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -339,6 +341,7 @@ def test_a_board_is_routed_and_what_somebody_changed_stays(made: Path, tmp_path:
     assert (other.returncode, "--layers" in other.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_board_goes_to_another_router_and_comes_back(made: Path, tmp_path: Path) -> None:
     """The session of a router that found nothing: everything is routed here."""
     folder, dsn, session = tmp_path / "design", tmp_path / "b.dsn", tmp_path / "b.ses"

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once
 
 CATALOG = load_catalog()
 SMALL = (
-    "\nformat = 1\n"
+    "format = 1\n"
     + PAPER_TABLE
     + """\
 [[response]]

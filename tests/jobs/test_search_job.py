@@ -392,6 +392,7 @@ def test_a_cure_that_cannot_be_is_refused_before_the_search(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("response", "target", "reached"),
     [

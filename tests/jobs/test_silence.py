@@ -151,6 +151,7 @@ def _silent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Progress, "doing", doing)
 
 
+@pytest.mark.slow
 def test_quiet_is_quiet_and_the_log_has_it(
     tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -239,6 +240,7 @@ def test_no_stage_of_a_run_is_silent(tmp_path: Path) -> None:
             assert any(text in line for line in lines), (name, text)
 
 
+@pytest.mark.slow
 def test_each_usual_time_is_of_a_stage_that_there_is() -> None:
     """Names of stages are texts, here as there."""
     sources = [p for p in PACKAGE.rglob("*.py") if p.name != Path(usual_times.__file__).name]

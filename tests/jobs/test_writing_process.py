@@ -20,6 +20,7 @@ from designer.model.find_responses import ModelResponse, find
 from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
 from designer.verbs.synthesise import synthesise
+from tests.shared.exploring import quick
 from tests.shared.house import ROOT
 from tests.shared.model_text import SMALL
 
@@ -87,7 +88,7 @@ class Dying(second_process.OtherProcess):
         return answer
 
 
-@pytest.mark.parametrize("stage", ["stated", "chosen"])
+@pytest.mark.parametrize("stage", quick(["stated", "chosen"]))
 def test_parts_are_chosen_for_the_responses_of_the_second_process(
     stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

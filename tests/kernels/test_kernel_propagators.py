@@ -130,6 +130,7 @@ def code(circuit: Circuit, board: Board, drive: Drive, *, closely: bool) -> int:
     )
 
 
+@pytest.mark.slow
 def test_step_by_step_no_run_that_clips_is_served_and_more_of_the_others_are() -> None:
     board, served = nominal_board(RECTIFIER), {False: 0, True: 0}
     clips = 0

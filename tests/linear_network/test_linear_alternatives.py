@@ -47,6 +47,7 @@ def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
             assert other.least >= block.bound - EXACT
 
 
+@pytest.mark.slow
 def test_the_best_of_those_tried_is_taken() -> None:
     """Against the first choice, and against every level of R4 tried one by one."""
     spec = replace(RECTIFIER, resistors=("E24",))
@@ -73,6 +74,7 @@ def test_the_best_of_those_tried_is_taken() -> None:
     assert best.errors.max_error <= min(errors) + EXACT or len(errors) > 10
 
 
+@pytest.mark.slow
 def test_the_rectifier_of_the_paper_s_case_is_exact_in_e96() -> None:
     file = read_model_file(EXAMPLES / "paper.toml")
     held = peaks(file.model, find(file.model, file.responses))
@@ -81,6 +83,7 @@ def test_the_rectifier_of_the_paper_s_case_is_exact_in_e96() -> None:
     assert design.certificate.status == "optimal"
 
 
+@pytest.mark.slow
 def test_a_dead_zone_s_own_bound_is_no_bound_of_the_circuit() -> None:
     """19 is no quotient of E24 values: the linear block is exact, the stop's slope is not."""
     file = read_model_file(EXAMPLES / "paper.toml")

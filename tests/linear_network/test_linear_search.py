@@ -17,7 +17,7 @@ from designer.linear_network.linear_terms import ANY, Bounds, LinearBlock, Short
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
 from tests.linear_network.test_linear_block import OPEN, random_model, targets_of, wanted_of
-from tests.shared.exploring import seeds
+from tests.shared.exploring import quick, seeds
 from tests.shared.linear_enumeration import Choices, Conditions, every_choice
 from tests.shared.oracles import LINEAR_NAMES
 
@@ -71,7 +71,7 @@ def compare(
     assert kinds[own] <= kinds[equals].min()
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 def test_every_choice_of_a_small_catalogue(seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
     t = targets_of(model)
@@ -103,7 +103,7 @@ def conditions(rng: np.random.Generator) -> tuple[Bounds, Conditions]:
     return bounds, kept
 
 
-@pytest.mark.parametrize("seed", seeds(8))
+@pytest.mark.parametrize("seed", quick(seeds(8)))
 def test_every_choice_under_side_conditions(seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed % 4))
     t, (bounds, kept) = targets_of(model), conditions(np.random.default_rng(seed))
@@ -123,7 +123,7 @@ MATCHED = [
 
 
 @pytest.mark.parametrize("matched", MATCHED, ids=str)
-@pytest.mark.parametrize("seed", seeds(2))
+@pytest.mark.parametrize("seed", quick(seeds(2)))
 def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
     t = targets_of(model)
@@ -133,7 +133,7 @@ def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], s
     compare(answer, truth)
 
 
-@pytest.mark.parametrize("most", [2, 3, 4, 5])
+@pytest.mark.parametrize("most", quick([2, 3, 4, 5]))
 @pytest.mark.parametrize("seed", seeds(3))
 def test_every_choice_of_few_values(most: int, seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
@@ -144,7 +144,7 @@ def test_every_choice_of_few_values(most: int, seed: int) -> None:
     compare(best(t, resistors, capacitors, np.ones(2), OPEN, spec), truth, 0.0, preferred)
 
 
-@pytest.mark.parametrize("slack", [0.005, 0.05])
+@pytest.mark.parametrize("slack", quick([0.005, 0.05]))
 @pytest.mark.parametrize("seed", seeds(3))
 def test_slack_buys_fewer_values(slack: float, seed: int) -> None:
     model, resistors, capacitors = near_exact(np.random.default_rng(seed))
@@ -154,7 +154,7 @@ def test_slack_buys_fewer_values(slack: float, seed: int) -> None:
     compare(answer, truth, slack)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick(range(4)))
 def test_the_cheapest_of_equals_is_taken(seed: int) -> None:
     """Only levels of capacitors differ: R C products are the same, prices are not."""
     rng = np.random.default_rng(seed)
@@ -173,7 +173,7 @@ def test_the_cheapest_of_equals_is_taken(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("steps", [10, 300, 1000, 2000])
+@pytest.mark.parametrize("steps", quick([10, 300, 1000, 2000]))
 def test_a_lower_bound_is_one_where_the_work_runs_out(
     seed: int, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,7 +213,9 @@ def test_exact_e24_parts_for_the_paper_are_found() -> None:
     assert len(set(answer.values.values())) <= 8
 
 
-@pytest.mark.parametrize("series", [("E24",), ("E96",), ("E192",), ("E24", "E96")])
+@pytest.mark.parametrize(
+    "series", quick(map(pytest.param, [("E24",), ("E96",), ("E192",), ("E24", "E96")]))
+)
 def test_series_are_proved(series: tuple[str, ...]) -> None:
     resistors, capacitors = series_values(series, 1e3, 1e6), series_values(["E12"], 1e-9, 1e-6)
     for seed in range(3):

@@ -30,6 +30,7 @@ from designer.linear_network.term_search import LOWER, TermConditions, TermDives
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.attempt import _in_ratio
 from designer.synthesis.dead_zone_target import slope_interval
+from tests.shared.exploring import quick
 from tests.shared.term_enumeration import Everything, Limits, everything, term_name
 
 CLOSE = 1e-7
@@ -111,9 +112,7 @@ def solve(
     return best(Targets.from_state_matrix(A), resistors, capacitors, prices, bounds, spec)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "no damper" else ()) for n in PATTERNS]
-)
+@pytest.mark.parametrize("name", quick(PATTERNS))
 @settings(max_examples=3)
 @given(seed=st.integers(0, 10**6))
 def test_every_choice_of_a_small_catalogue(name: str, seed: int) -> None:
@@ -127,7 +126,7 @@ def test_every_choice_of_a_small_catalogue(name: str, seed: int) -> None:
     compare(solve(A, resistors, capacitors, Limits()), truth)
 
 
-@pytest.mark.parametrize("name", ["one mass", "one damper", "no coupling damper"])
+@pytest.mark.parametrize("name", quick(["one mass", "one damper", "no coupling damper"]))
 @settings(max_examples=4)
 @given(seed=st.integers(0, 10**6))
 def test_every_choice_under_side_conditions(name: str, seed: int) -> None:
@@ -157,7 +156,7 @@ MATCHED = [
 
 
 @pytest.mark.parametrize("matched", MATCHED, ids=str)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", quick(range(2)))
 def test_every_choice_with_matched_parts(matched: tuple[tuple[str, ...], ...], seed: int) -> None:
     resistors, capacitors = catalogue(np.random.default_rng(seed), 2, 2)
     A = near_exact(NO_COUPLING_DAMPER, resistors, capacitors, seed)
@@ -218,7 +217,7 @@ def test_the_cheapest_of_equals_is_taken() -> None:
         assert sum(own) == price.min()
 
 
-@pytest.mark.parametrize("steps", [400, 8_000, 100_000])
+@pytest.mark.parametrize("steps", quick([400, 8_000, 100_000]))
 def test_a_lower_bound_is_one_where_the_work_runs_out(
     steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -235,7 +234,7 @@ def test_a_lower_bound_is_one_where_the_work_runs_out(
     assert answer.proved is (answer.error <= answer.bound + EXACT)
 
 
-@pytest.mark.parametrize("name", ["one damper", "no coupling damper", "chain of three"])
+@pytest.mark.parametrize("name", quick(["one damper", "no coupling damper", "chain of three"]))
 def test_dives_find_a_choice_near_the_best_there_is(name: str) -> None:
     """Against every choice: one that keeps the conditions, and the same one each time."""
     pattern, n, m = PATTERNS[name]
@@ -258,6 +257,7 @@ def test_dives_find_a_choice_near_the_best_there_is(name: str) -> None:
     assert truth.errors[row] == pytest.approx(first.error, abs=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", [SINGLE, NO_COUPLING_DAMPER], ids=["one mass", "two masses"])
 def test_series_are_proved(pattern: Array) -> None:
     resistors, capacitors = series_values(["E96"], 4.7e3, 5e5), series_values(["E12"], 1e-9, 1e-6)

@@ -44,6 +44,7 @@ def model(*more: str) -> LumpedSystem:
     return found
 
 
+@pytest.mark.slow
 @given(PLACES, FORCES, st.sampled_from([1.0, 0.4, 3.0]))
 def test_what_joins_in_at_the_corners_makes_the_force(
     places: list[int], forces: list[int], factor: float

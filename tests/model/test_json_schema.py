@@ -91,6 +91,7 @@ def test_every_key_says_what_it_is() -> None:
     assert "None" not in json.dumps([key.get("default", 0) for key in described])
 
 
+@pytest.mark.slow
 def test_a_new_file_has_its_schema_beside_it(tmp_path: Path) -> None:
     new(tmp_path / "first.toml", format=2)
     place = tmp_path / SCHEMA

@@ -208,6 +208,7 @@ def test_a_text_without_a_file_has_no_list() -> None:
         spread_of(modelfile, CIRCUIT, load_catalog())
 
 
+@pytest.mark.slow
 def test_a_design_folder_keeps_the_list_and_notices_another(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -266,6 +266,7 @@ def test_a_dimensionless_model_knows_no_hertz(paper: Path, capfd: Captured) -> N
     assert "[mechanical]" in refused(capfd, *words)
 
 
+@pytest.mark.slow
 def test_pictures_are_named_by_few_digits_of_what_si_values_give(
     drill: Path, tmp_path: Path, capfd: Captured
 ) -> None:

@@ -105,6 +105,7 @@ def test_the_dc_curve_is_eq_20() -> None:
     np.testing.assert_allclose(dc_curve(build(PRINTED, CATALOG), v1), wanted, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_ngspice_draws_the_same_curve_of_the_stage_alone() -> None:
     assert _stage(corrected().circuit) == {
         *(f"R{i}" for i in range(200, 211)), "U3A", "U3B", "U3C", "U3D"

@@ -53,6 +53,7 @@ def test_a_map_has_a_colour_for_a_period_that_cannot_be_wanted() -> None:
     assert len(set(looks.values())) == 4
 
 
+@pytest.mark.slow
 def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
     file = parse_model_file(HAMMER)
     values = np.linspace(LAST_OF_THE_FIRST, 61.0, 21)
@@ -74,6 +75,7 @@ def test_windows_and_panels_of_two_stops_are_told_apart() -> None:
     assert [t.get_text() for t in legend.get_texts()] == ["followed down", "not symmetric"]
 
 
+@pytest.mark.slow
 def test_the_name_of_a_window_at_the_edge_keeps_clear_of_the_arrow_of_its_track() -> None:
     """Half a step of it lies beside the axes: there is room for what is seen of it alone."""
     file = parse_model_file(HAMMER)

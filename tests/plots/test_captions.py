@@ -71,6 +71,7 @@ def _settled(omega: float, start: Any) -> tuple[str, bool | None]:
     return orbit.response, orbit.symmetric
 
 
+@pytest.mark.slow
 def test_what_changes_is_told_for_each_direction(both: Sweep, points: list[Bifurcation]) -> None:
     """At the pitchfork a track loses or gains the symmetry; a fold ends an orbit for the track
     that comes from it, and the other does not meet it. Settling from the orbit's own state, past
@@ -102,6 +103,7 @@ def test_what_changes_is_told_for_each_direction(both: Sweep, points: list[Bifur
         assert point_captions.label(*gone) != change.before
 
 
+@pytest.mark.slow
 def test_a_point_that_no_track_meets_has_no_track(points: list[Bifurcation]) -> None:
     """By a sweep that stays above the pitchfork, its point is only the branch's."""
     (fork,) = [p for p in points if p.kind == "pitchfork" and p.value > 1.4]
@@ -131,7 +133,9 @@ def _texts(figure: Any) -> str:
     return " ".join(" ".join(said).split())
 
 
-def test_pictures_can_be_read_alone(both: Sweep) -> None:
+def test_pictures_can_be_read_alone() -> None:
+    few = np.linspace(1.30, 1.55, 11)
+    both = sweep.run(SweepPlan(ModelSubject(PAPER), "omega", few, ("down", "up"), course=QUICK))
     said = _texts(bifurcation_plots.diagram(both, name="Small"))
     parts = (
         "Small bifurcation diagram", "over ω, followed down and followed up", "b = 0.25", "ζ = 0.1",
@@ -172,6 +176,7 @@ def test_a_board_is_told_in_hertz_and_volts() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_aperiodic_stretches_are_in_the_table_and_the_legend(
     capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -28,6 +28,7 @@ from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.yield_count import Yield
+from tests.shared.exploring import quick
 from tests.shared.figure_text import clipped, overlapping
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -92,7 +93,7 @@ def _figures() -> dict[str, Callable[[], Figure]]:
     }
 
 
-@pytest.mark.parametrize("name", sorted(_figures()))
+@pytest.mark.parametrize("name", quick(sorted(_figures()), 4))
 def test_every_figure_renders_and_is_the_same_twice(name: str) -> None:
     draw = _figures()[name]
     first, second = figure_style.to_svg(draw()), figure_style.to_svg(draw())
@@ -107,14 +108,14 @@ def test_every_figure_renders_and_is_the_same_twice(name: str) -> None:
     assert content == figure_style.to_png(draw())
 
 
-@pytest.mark.parametrize("name", sorted(_figures()))
+@pytest.mark.parametrize("name", quick(sorted(_figures()), 4))
 def test_no_text_is_cut_off_or_covered(name: str) -> None:
     figure = _figures()[name]()
     assert clipped(figure) == []
     assert overlapping(figure) == []
 
 
-@pytest.mark.parametrize("name", sorted(_figures()))
+@pytest.mark.parametrize("name", quick(sorted(_figures()), 4))
 def test_the_last_digits_of_the_layout_do_not_show(name: str) -> None:
     """The layout's solver goes through its variables by address: two processes differ by that."""
     documents = []

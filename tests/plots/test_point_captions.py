@@ -96,6 +96,7 @@ def test_a_caption_is_what_another_integrator_sees(
         assert moved[0] > 1e-3
 
 
+@pytest.mark.slow
 def test_a_fold_and_a_grazing_point_are_told_by_their_own_branch() -> None:
     """Both sides of the grazing are run by the other integrator; past the fold there is none."""
     touched = branch(0.70, 0.6855, 0.701)

@@ -23,6 +23,7 @@ from designer.yields.loss_replay import PartAttribution
 from designer.yields.margins import Prediction
 from designer.yields.worst_corner import Index
 from designer.yields.yield_maps import Axis, YieldMap
+from tests.shared.exploring import quick
 from tests.shared.figure_text import clipped, overlapping
 
 LABELS = ["ω = 0.54   1-3-3", "ω = 0.41   1-4-4"]
@@ -75,14 +76,14 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-@pytest.mark.parametrize("name", sorted(FIGURES))
+@pytest.mark.parametrize("name", quick(sorted(FIGURES), 3))
 def test_no_text_is_cut_off_or_covered(name: str) -> None:
     figure = FIGURES[name]()
     assert clipped(figure) == []
     assert overlapping(figure) == []
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 9])
+@pytest.mark.parametrize("count", quick([1, 3, 4, 9]))
 def test_charts_of_attribution_have_room_for_their_text(count: int) -> None:
     labels = [f"ω = 0.{k}15   1-{k}-{k}" for k in range(1, count + 1)]
     one = attributed({"thresholds of the dead zone": 8, "R204A": 3})
@@ -93,7 +94,7 @@ def test_charts_of_attribution_have_room_for_their_text(count: int) -> None:
         assert overlapping(figure) == []
 
 
-@pytest.mark.parametrize("name", sorted(FIGURES))
+@pytest.mark.parametrize("name", quick(sorted(FIGURES), 3))
 def test_figures_are_the_same_twice(name: str) -> None:
     assert figure_style.to_svg(FIGURES[name]()) == figure_style.to_svg(FIGURES[name]())
 

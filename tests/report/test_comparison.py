@@ -283,6 +283,7 @@ def test_another_system_has_no_circuit_of_the_paper_s(capfd: pytest.CaptureFixtu
     assert f"{path}: --compare: found a file of format 2" in said
 
 
+@pytest.mark.slow
 def test_without_a_folder_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -305,6 +305,7 @@ def test_a_response_that_survives_nowhere_has_no_recommended_setting(full: Repor
     assert "nowhere" in render_markdown(data)
 
 
+@pytest.mark.slow
 def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: ReportData) -> None:
     html, markdown = render_html(full), render_markdown(full)
     page = Page(html)

@@ -46,6 +46,7 @@ from designer.yields.study import RunResult, Study
 from designer.yields.study_plan import plan_study
 from tests.shared.blank_figures import blank_figures
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.exploring import quick
 from tests.shared.kicad_cases import case_files
 from tests.shared.mechanism_file import HAMMER
 from tests.shared.model_text import dimensionless
@@ -83,6 +84,7 @@ def html(whole: ReportData) -> str:
     return render_html(whole)
 
 
+@pytest.mark.slow
 def test_a_study_that_went_on_takes_the_design_s_pictures_over(
     whole: ReportData, html: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -244,6 +246,7 @@ def test_what_is_below_the_first_screen_is_folded_by_question(html: str) -> None
     assert all(line for _, line in lines)
 
 
+@pytest.mark.slow
 def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
     answers = [
         replace(a, verdict=Verdict.LOST if (a.sample, a.question) == (1, 2) else Verdict.OK)
@@ -259,6 +262,7 @@ def test_each_response_has_its_bar_with_its_interval(whole: ReportData) -> None:
     assert "(30 to 95)" in bars
 
 
+@pytest.mark.slow
 def test_commands_have_the_name_of_the_folder(whole: ReportData) -> None:
     data = replace(whole, folder="a rig; <b>")
     html, text = without_pictures(data), render_markdown(data)
@@ -342,7 +346,7 @@ def test_what_is_wide_scrolls_in_a_box_of_its_own(html: str) -> None:
     assert not Table(("a", "b", "c"), (("short", "of a few words", "1"),)).broad
 
 
-@pytest.mark.parametrize("sides", ["both", "upper"])
+@pytest.mark.parametrize("sides", quick(["both", "upper"]))
 def test_the_model_is_drawn_with_its_equations(whole: ReportData, sides: Sides) -> None:
     model = replace(dimensionless(whole.design.model), sides=sides)
     data = changed(whole, design=replace(whole.design, model=model))
@@ -443,6 +447,7 @@ def test_no_time_and_no_path_of_this_machine_stands_in_it(whole: ReportData, htm
     assert str(EXAMPLE.parent) not in html + render_markdown(whole)
 
 
+@pytest.mark.slow
 def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     bom = [{**whole.bom[0], "manufacturer": HOSTILE, "part_number": "x" * 70}]
     modelfile = replace(whole.result.modelfile, title=HOSTILE)
@@ -460,6 +465,7 @@ def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     assert f"    run {' '.join(HOSTILE.split())}" in markdown.splitlines()
 
 
+@pytest.mark.slow
 def test_a_response_that_is_left_out_of_the_study(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=whole.plan.questions[:2])
     answers = tuple(a for a in whole.study.answers if a.question < 2)
@@ -510,6 +516,7 @@ def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
     assert (data.study.all_on_one_board.ok, data.study.all_on_one_board.lost) == (0, 4)
 
 
+@pytest.mark.slow
 def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
     answers = [
         replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.study.answers
@@ -526,6 +533,7 @@ def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
     assert "3 runs gave no answer, which the yields leave out" in text
 
 
+@pytest.mark.slow
 def test_results_of_a_script_have_no_command(whole: ReportData) -> None:
     nameless = replace(whole, command="")
     for text in (words_of(nameless).text, render_markdown(nameless)):
@@ -589,6 +597,7 @@ def test_without_responses(whole: ReportData) -> None:
         assert "None was asked for." in text
 
 
+@pytest.mark.slow
 def test_engine_that_has_no_orbit_at_all(whole: ReportData) -> None:
     first = whole.checked[0]
     broken = replace(first, model=replace(first.model, orbit=failed("diverged"), found=False))
@@ -596,6 +605,7 @@ def test_engine_that_has_no_orbit_at_all(whole: ReportData) -> None:
     assert "the model shows failed (diverged) instead" in text
 
 
+@pytest.mark.slow
 def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) -> None:
     errors = {**whole.design.errors.errors, "stop slope": 0.0123}
     larger = replace(whole.design.errors, errors=errors, max_error=0.0123)
@@ -649,6 +659,7 @@ def test_thresholds_of_several_clearances_are_those_of_the_circuit() -> None:
     assert rows["contact in B begins at (v5)"] == "2.1\u00a0V"
 
 
+@pytest.mark.slow
 def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     text = """
         format = 1
@@ -708,6 +719,7 @@ def test_a_place_that_cannot_be_written(whole: ReportData, tmp_path: Path) -> No
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_board_is_shown_from_both_sides(whole: ReportData, tmp_path: Path) -> None:
     texts = case_files("paper")
     board = tmp_path / "board.kicad_pcb"

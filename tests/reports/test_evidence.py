@@ -109,6 +109,7 @@ def test_the_modes_of_a_chain() -> None:
     assert modes == pytest.approx(chain_frequencies(3, 1.0, 1.0), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_report_without_a_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(frequency_sweep, "STEPS", 12)
     out = tmp_path / "new" / "three-masses"

@@ -17,6 +17,7 @@ from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
 from reports.makers.first_grazing import first_grazings, located_grazing
 from tests.shared.event_integrator import integrate
+from tests.shared.exploring import quick
 from tests.shared.mechanism_file import mechanism_of, omega_of
 from tests.shared.mechanisms import absolute
 
@@ -54,7 +55,7 @@ def test_the_wanted_responses_close_in_an_independent_integrator(path: Path) -> 
         assert text == wanted[number]["expect"]
 
 
-@pytest.mark.parametrize("name", TOUCHED)
+@pytest.mark.parametrize("name", quick(TOUCHED))
 def test_the_first_touch_is_where_the_linear_response_fills_the_gap(name: str) -> None:
     model, omega = read_model_file(EXAMPLES / f"{name}.toml").model, TOUCHED[name]
     first = first_grazings(model, omega)[0].b

@@ -103,6 +103,7 @@ assert "| `many-parts` | Resistors of the circuit | at most 40 |" in rule_report
 """
 
 
+@pytest.mark.slow
 def test_a_design_rule_touches_two_files(tmp_path: Path) -> None:
     """Its line in the list and the function that looks; the page's table is made from the list."""
     place = grown(tmp_path, RULE)
@@ -186,6 +187,7 @@ print(json.dumps([law.quantity, law.row, law.points]))
 """
 
 
+@pytest.mark.slow
 def test_a_law_of_force_touches_three_files(tmp_path: Path) -> None:
     """Its class, a field of the elements and a table of the model file. What the flow gets is that
     force; checks, tables, sketch and drawing have it too."""
@@ -227,6 +229,7 @@ assert np.isclose(record.time[-1], 499e-4)
 """
 
 
+@pytest.mark.slow
 def test_a_format_of_records_touches_one_file(tmp_path: Path) -> None:
     run(grown(tmp_path / "copy", SCOPE), "-c", RECORD, tmp_path / "record.mat")
 
@@ -273,6 +276,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_a_variant_of_the_rectifier_touches_two_files(tmp_path: Path) -> None:
     """Its name, and what is built: here a stage each half of which has an output of its own,
     whether its halves are equal or not. It is chosen, and shows what the model does."""
@@ -388,6 +392,7 @@ print(json.dumps([off, np.abs(points).max(axis=0).tolist()]))
 """
 
 
+@pytest.mark.slow
 def test_a_simulator_touches_two_files(tmp_path: Path) -> None:
     """Its name, and what differs in its deck: here how voltages are kept. ngspice reads the rest:
     two periods with impacts are those of the exact circuit."""

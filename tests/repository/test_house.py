@@ -240,6 +240,7 @@ def test_nothing_asks_for_the_time_of_day() -> None:
     assert asked == []
 
 
+@pytest.mark.slow
 def test_dynamics_and_bifurcations_stand_alone() -> None:
     """Shaw and Holmes' oscillator, built by hand where no other package can be imported."""
     script = textwrap.dedent(

@@ -196,6 +196,7 @@ def test_bifurcation(model: Path, tmp_path: Path) -> None:
     assert "x1 and x2" in basins._repr_html_()
 
 
+@pytest.mark.slow
 def test_export_and_rules_of_a_folder(folder: Path, ruled: designer.RulesResult) -> None:
     exported = designer.export(folder)
     assert all(path.is_file() for path in exported.files)
@@ -241,6 +242,7 @@ def test_a_path_without_a_folder_to_write_is_refused_as_on_the_command_line(mode
         designer.synthesise(designer.read_model_file(model)).boards()
 
 
+@pytest.mark.slow
 def test_run(model: Path) -> None:
     """In ngspice, one response."""
     file = designer.read_model_file(model)
@@ -399,6 +401,7 @@ def test_the_parts_are_those_of_the_design_file(folder: Path, made: designer.Job
 # Notebooks
 
 
+@pytest.mark.slow
 def test_a_hostile_title_is_escaped(made: designer.JobOutcome, ruled: designer.RulesResult) -> None:
     for shown in (made, ruled):
         text = shown._repr_html_()

@@ -18,6 +18,7 @@ from designer.board.sexpr import Expression, expression_text, read
 from designer.routing.board_copper import BoardCopper, layer_count, read_copper, with_layers
 from designer.routing.net_kinds import kinds_of_nets, net_kinds
 from designer.routing.routed_board import RoutedBoard, cut_open, route_board
+from tests.shared.answer_store import stored
 from tests.shared.kicad_cases import case, case_files
 
 NAME = "one mass"
@@ -30,7 +31,8 @@ def placed() -> str:
 @cache
 def routed() -> RoutedBoard:
     circuit = case(NAME).circuit
-    return route_board(placed(), circuit, board_rules(circuit))
+    made: RoutedBoard = stored(route_board)(placed(), circuit, board_rules(circuit))
+    return made
 
 
 @cache
@@ -93,6 +95,7 @@ def test_summing_nodes_are_short_and_stay_on_the_front() -> None:
     assert not nodes & {circuit_net(names[int(v.get("net").number())]) for v in vias}
 
 
+@pytest.mark.slow
 def test_the_same_board_twice_and_nothing_more_on_a_routed_one() -> None:
     circuit = case(NAME).circuit
     rules = board_rules(circuit)
@@ -102,6 +105,7 @@ def test_the_same_board_twice_and_nothing_more_on_a_routed_one() -> None:
     assert (again.vias, sum(again.lengths.values())) == (0, 0.0)
 
 
+@pytest.mark.slow
 def test_what_is_routed_stays_and_what_is_open_is_routed() -> None:
     """Without the tracks of one net, and with a part that somebody has moved."""
     circuit = case(NAME).circuit
@@ -238,6 +242,7 @@ def test_no_via_joins_islands_of_ground_to_each_other_alone() -> None:
     assert inside(route_board(small(pad + fence), circuit, rules).text) == (0, 0.0)
 
 
+@pytest.mark.slow
 def test_on_four_layers_every_pad_of_ground_reaches_the_planes() -> None:
     """By tracks of its own side to a via, or through the board; no track leads from pad to pad."""
     circuit = case(NAME).circuit

@@ -16,8 +16,9 @@ from designer.board.kicad_rules import board_rules
 from designer.board.net_classes import CLASSES, DEFAULT, SUMMING, SUPPLY
 from designer.board.sexpr import Expression, expression, expression_text, read, word
 from designer.routing.board_copper import read_copper
-from designer.routing.routed_board import route_board
+from designer.routing.routed_board import RoutedBoard, route_board
 from designer.routing.specctra import design_text, with_session
+from tests.shared.answer_store import stored
 from tests.shared.kicad_cases import case, case_files, written
 from tests.shared.kicad_python import asked_of_pcbnew
 
@@ -47,7 +48,8 @@ def board_name() -> str:
 @cache
 def routed() -> str:
     circuit = case(NAME).circuit
-    return route_board(placed(), circuit, board_rules(circuit)).text
+    made: RoutedBoard = stored(route_board)(placed(), circuit, board_rules(circuit))
+    return made.text
 
 
 def project(folder: Path, text: str) -> Path:
@@ -121,6 +123,7 @@ def test_another_router_is_told_what_kicad_would_tell_it(tmp_path: Path) -> None
     assert edge(made) == edge(true)
 
 
+@pytest.mark.slow
 def test_each_net_has_the_width_and_clearance_of_its_class(tmp_path: Path) -> None:
     made = ours(project(tmp_path, routed()))
     sizes = dict[str, tuple[float, float]]()
@@ -205,6 +208,7 @@ def test_a_session_is_read_as_kicad_reads_it(tmp_path: Path) -> None:
     assert tracks(with_session(routed(), file)) == by_kicad
 
 
+@pytest.mark.slow
 def test_what_a_session_leaves_open_is_routed_here(tmp_path: Path) -> None:
     """A whole session leaves nothing to do; without one net, that net alone is routed."""
     circuit, file = case(NAME).circuit, tmp_path / "board.ses"

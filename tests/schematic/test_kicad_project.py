@@ -35,6 +35,7 @@ from designer.board.summing_nodes import node_spans, shortest_tree
 from designer.circuit.netlist import Resistor
 from designer.schematic.kicad_project import Project, files
 from tests.base.test_views import CIRCUITS
+from tests.shared.exploring import quick
 from tests.shared.kicad_cases import CASES, case, case_files, project
 
 Point = tuple[float, float]
@@ -115,7 +116,7 @@ class Drawing:
         return out
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_the_sheet_connects_what_the_components_say(name: str) -> None:
     drawing = Drawing(part_of(name, ".kicad_sch"))
     simulated = {"VM1", "VCC1", "VEE1"}
@@ -129,7 +130,7 @@ def test_the_sheet_connects_what_the_components_say(name: str) -> None:
     assert all(drawing.pins[pin] in drawing.open for pin in free)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_the_board_and_the_netlist_carry_the_same_nets(name: str) -> None:
     board = part_of(name, ".kicad_pcb")
     numbers = {net.text(1): net.text(0) for net in board.all("net")}
@@ -154,7 +155,7 @@ def test_the_board_and_the_netlist_carry_the_same_nets(name: str) -> None:
     assert {n: p for n, p in listed.items() if not n.startswith("unconnected-")} == wanted
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_components_stand_apart_on_the_board(name: str) -> None:
     placement = placed(case(name))
     names = [s.component.reference for s in placement.spots]
@@ -171,7 +172,7 @@ def test_components_stand_apart_on_the_board(name: str) -> None:
         assert edge.top < yard.top < yard.bottom < edge.bottom
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_decoupling_stands_at_the_supply_pins(name: str) -> None:
     spots = {s.component.reference: s for s in placed(case(name)).spots}
     near = [s for s in spots.values() if s.component.near]
@@ -188,7 +189,7 @@ def placed(made: Project) -> Placement:
     return place(made.circuit, [c for c in made.components if View.BOARD in c.views])
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_the_pads_of_a_summing_node_stand_together(name: str) -> None:
     """25 mm where parts are on the surface, 45 mm where they stand in holes."""
     made = case(name)
@@ -203,7 +204,7 @@ def test_the_tree_of_a_node_is_the_shortest(points: set[tuple[int, int]]) -> Non
     assert shortest_tree(sorted(points)) == pytest.approx(minimum_spanning_tree(apart).sum())
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_ids_are_given_once_and_references_lead_to_their_symbols(name: str) -> None:
     sheet, board = (part_of(name, end) for end in (".kicad_sch", ".kicad_pcb"))
     for tree in (sheet, board):
@@ -313,6 +314,7 @@ def test_names_of_nets_lead_back() -> None:
             assert circuit_net(kicad_net(net)) == net
 
 
+@pytest.mark.slow
 def test_each_footprint_of_the_board_is_in_the_project_s_library() -> None:
     for name in CASES:
         made = case_files(name)

@@ -24,6 +24,7 @@ from designer.schematic.sheet_drawing import (
     text_width,
 )
 from designer.schematic.sheet_layout import arranged, layout
+from tests.shared.exploring import quick
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, written
 
 LINE_STEP = 1.62
@@ -102,7 +103,7 @@ def body(s: Placed) -> Box:
     return Box(name, min(xs) + edge, min(ys) + edge, max(xs) - edge, max(ys) - edge)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, 3))
 def test_nothing_lies_over_anything(name: str) -> None:
     """Texts and symbols; a wire may end at a symbol and runs through none, nor through a text."""
     sheet = sheet_of(case(name))

@@ -34,6 +34,7 @@ from designer.spice.equation_check import (
 from designer.spice.pool import SpicePool
 from designer.verbs import tables
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.exploring import quick
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
@@ -174,7 +175,7 @@ STAGES: dict[str, tuple[Circuit, Sides]] = {
 }
 
 
-@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("name", quick(STAGES))
 def test_every_stage_passes(pool: SpicePool, name: str) -> None:
     circuit, sides = STAGES[name]
     design = around(circuit, stage_model(sides))
@@ -255,7 +256,7 @@ def test_a_sign_that_is_wrong_is_found(pool: SpicePool) -> None:
     assert not check(design, synthesis.model_responses, pool).passed
 
 
-@pytest.mark.parametrize("values", [rectifier(5.0), bought(rectifier(5.0))])
+@pytest.mark.parametrize("values", quick([rectifier(5.0), bought(rectifier(5.0))]))
 def test_a_diode_that_ngspice_finds_better_alone(pool: SpicePool, values: dict[str, float]) -> None:
     """Told where the op-amps rest, ngspice ends here with "source stepping failed"."""
     result = check(around(stage("rectifier", "both", values), stage_model("both")), (), pool)

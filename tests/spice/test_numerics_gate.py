@@ -242,6 +242,7 @@ def test_a_generator_with_an_offset(pool: SpicePool) -> None:
 # Traps
 
 
+@pytest.mark.slow
 def test_gear_at_default_tolerance_makes_a_periodic_orbit_look_aperiodic(
     pool: SpicePool, passed: dict[int, GateResult]
 ) -> None:
@@ -255,6 +256,7 @@ def test_gear_at_default_tolerance_makes_a_periodic_orbit_look_aperiodic(
     assert heard(pool, who, passed[3].settings).response == "1-3-3"
 
 
+@pytest.mark.slow
 def test_two_hundred_steps_a_period_miscount_eight_impacts(
     pool: SpicePool, passed: dict[int, GateResult]
 ) -> None:
@@ -306,6 +308,7 @@ def test_a_response_without_a_period_is_compared_by_name_alone(
         assert np.isnan([result.difference, result.wave, result.wave_bound]).all()
 
 
+@pytest.mark.slow
 def test_engines_that_disagree_do_not_pass(pool: SpicePool) -> None:
     """An orbit that the circuit does not show: no step makes ngspice say so."""
     who = subject(1)
@@ -317,6 +320,7 @@ def test_engines_that_disagree_do_not_pass(pool: SpicePool) -> None:
     assert result.read.orbit.response == "1-1-1"
 
 
+@pytest.mark.slow
 def test_runs_that_fail_do_not_pass(pool: SpicePool) -> None:
     who = subject(1)
     broken = replace(who, start=np.full(4, np.nan))

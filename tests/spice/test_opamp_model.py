@@ -25,13 +25,14 @@ from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
 from designer.spice.opamp_model import FIDELITIES, recovery, second_pole
 from designer.spice.worker import open_simulator
 from tests.circuit.test_reduction import EXACT, circuit_of
+from tests.shared.exploring import quick
 
 CATALOG = load_catalog()
 NAMES = [o.name for o in CATALOG.opamps]
 CIRCUIT = circuit_of(EXACT)
 WITH_MEMORY = [r for r in FIDELITIES if r != "ideal"]
 
-each = pytest.mark.parametrize("name", NAMES)
+each = pytest.mark.parametrize("name", quick(NAMES, 2))
 every_fidelity = pytest.mark.parametrize("fidelity", FIDELITIES)
 every_fidelity_with_memory = pytest.mark.parametrize("fidelity", WITH_MEMORY)
 
@@ -175,7 +176,7 @@ def test_slew(name: str, fidelity: Fidelity) -> None:
         assert edge == pytest.approx(opamp.slew.nominal, rel=0.01)
 
 
-@each
+@pytest.mark.parametrize("name", quick(NAMES))
 @every_fidelity_with_memory
 def test_recovery_is_the_parameter(name: str, fidelity: Fidelity) -> None:
     """No data sheet fixes it for every circuit: swept over two decades, it follows within 4 %.

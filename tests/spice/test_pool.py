@@ -140,6 +140,7 @@ def ends(pid: int) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_workers(pool: SpicePool) -> None:
     jobs = [job(everything, deck(1e3 + 37.0 * i)) for i in range(12)]
     jobs[3] = job(last_value, FLOATING)
@@ -219,6 +220,7 @@ def test_a_job_is_tried_again(pool: SpicePool, tmp_path: Path) -> None:
     assert isinstance(result, float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["shared", "batch"])
 def test_a_job_that_hangs(backend: Backend, folder: Path) -> None:
     # neither ngspice itself nor the analysis may take for ever
@@ -357,6 +359,7 @@ def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_workers_of_a_killed_parent_end_amid_their_jobs(tmp_path: Path) -> None:
     process, pids, _ = start_interrupted(tmp_path)
     process.kill()

@@ -240,6 +240,7 @@ def test_offsets_and_unequal_limits_reach_both_decks(monkeypatch: pytest.MonkeyP
 # The verb
 
 
+@pytest.mark.slow
 def test_export_writes_a_deck_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "pair.toml").write_text(MODEL, encoding="utf-8")
     folder = tmp_path / "design"

@@ -20,6 +20,7 @@ from designer.spice.pool import SpicePool
 CHAOS = Path(__file__).parents[2] / "examples" / "two-wells-chaos.toml"
 
 
+@pytest.mark.slow
 def test_ngspice_has_the_exponent_of_the_exact_circuit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two ways that share nothing: a tangent vector of the reduction, whose exponent is known to
     1 %, and runs that part, known to some 10 % with so few of them."""

@@ -141,6 +141,7 @@ def test_parts_of_a_better_grade_are_said_everywhere() -> None:
     assert better_grades_text(better_grades(plain, MIXED, CATALOG)) == ""
 
 
+@pytest.mark.slow
 def test_the_table_and_the_report_say_so(capfd: pytest.CaptureFixture[str]) -> None:
     for grades, there in ((FIVE, True), ("", False)):
         made = made_of(file_of(grades), MIXED)
@@ -386,6 +387,7 @@ def test_which_files_it_can_be_about() -> None:
     assert set(plain) == {"model", "catalogue", "version"}
 
 
+@pytest.mark.slow
 def test_a_study_renews_the_bill_of_a_folder_of_that_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -66,6 +66,7 @@ def test_a_loss_that_adds_next_to_nothing_walks_less() -> None:
         assert len(large) == count * BOARDS
 
 
+@pytest.mark.slow
 def test_a_loss_that_is_called_otherwise_on_better_parts_is_followed() -> None:
     """Far beyond the limit, where bad parts lie, it shows another kind."""
 

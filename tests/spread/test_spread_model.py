@@ -106,6 +106,7 @@ def test_each_number_moves_what_it_is_named_after_and_nothing_else() -> None:
     assert seen == set(base)
 
 
+@pytest.mark.slow
 def test_no_two_coordinates_are_related() -> None:
     numbers = cube(5, EVERYTHING.coordinates(RECTIFIER), range(N))
     assert numbers.min() >= 0.0
@@ -196,6 +197,7 @@ def test_parts_that_track(share: float) -> None:
     assert np.abs(off[0] - off[1]).max() >= 1.9 * 0.01 * (1.0 - share)
 
 
+@pytest.mark.slow
 def test_temperature_and_ageing_by_their_second_moments() -> None:
     """Value = (1 + d)(1 + a)(1 + t·ΔT), four independent draws; ΔT is the board's."""
     low, high = 1e-4, 4e-4

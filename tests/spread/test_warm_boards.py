@@ -25,6 +25,7 @@ from designer.spread import random_streams
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of, warmed
 from designer.spread.spread import OpAmpDrift, Spread, draw, draw_many, part_of
+from tests.shared.exploring import quick
 from tests.shared.stages import bought, rectifier, stage
 from tests.spice.test_fidelities import paper, run
 from tests.spice.test_rectifier_ngspice import SCALED, subject
@@ -215,7 +216,7 @@ def parameters(netlist: str, name: str) -> dict[str, float]:
     return {k: float(v) for k, v in re.findall(r"(\w+)=(\S+)", line)}
 
 
-@pytest.mark.parametrize("celsius", [-20.0, 25.0, 85.0])
+@pytest.mark.parametrize("celsius", quick([-20.0, 25.0, 85.0]))
 def test_ngspices_finest_op_amps_show_the_response_of_the_warm_board(celsius: float) -> None:
     """The exact circuit decides with offsets, bias currents and limits at their temperature alone;
     the deck has gain-bandwidth, slew rate and loaded limits there too. Strobes are within 3 % of

@@ -13,6 +13,7 @@ from designer.spice import equation_check
 from designer.spice.pool import SpicePool
 from designer.synthesis.attempt import largest_amplitudes
 from designer.synthesis.part_checks import check_choices
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 
 TWO = system_text(
@@ -83,7 +84,7 @@ SHAKEN = (
 
 
 @pytest.mark.parametrize(
-    ("text", "objective"), [(ONE, "margin"), (ONE, "match"), (LINKED, "margin")]
+    ("text", "objective"), quick([(ONE, "margin"), (ONE, "match"), (LINKED, "margin")])
 )
 def test_stops_too_unequal_for_one_output_get_one_each(text: str, objective: str) -> None:
     """Ten times as steep as the other one: what the circuit does is what the model does, in the

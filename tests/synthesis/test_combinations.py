@@ -20,6 +20,7 @@ from designer.model.model_file import parse_model_file
 from designer.report import words
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool
+from tests.shared.exploring import quick
 from tests.shared.system_text import table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
@@ -62,7 +63,7 @@ def made(text: str) -> Synthesis:
 
 
 @pytest.mark.parametrize(
-    "name", [*TEXTS, pytest.param("gears", marks=pytest.mark.slow)]
+    "name", quick([*TEXTS, "gears"])
 )  # fmt: skip
 def test_chosen_parts_do_what_the_model_does(name: str, pool: SpicePool) -> None:
     """By the reduction of the parts, and by ngspice's own transfer functions, which are of a mass
@@ -153,6 +154,7 @@ def test_what_cancels_in_the_couplings_is_nothing() -> None:
     assert result.design.amplitude() > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [1.0, -1.0])
 def test_the_picture_of_a_law_is_of_what_it_depends_on(turn: float) -> None:
     """As the board makes it, within its errors, whatever the factors and couplings."""
@@ -165,6 +167,7 @@ def test_the_picture_of_a_law_is_of_what_it_depends_on(turn: float) -> None:
     assert curve.made == pytest.approx(wanted, abs=0.02 * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_thresholds_are_told_on_the_scale_of_their_mass() -> None:
     file = parse_model_file(TEXTS["combined"].replace("0.8, right = -0.4", "0.4, right = -0.8"))
     design = synthesise(file, jobs=2).design

@@ -124,7 +124,8 @@ def truth(made: Design) -> float:
     return coefficient_error(values, Plain(m.m, m.k, m.k0, m.c, m.zeta, m.f20, m.b))
 
 
-@pytest.mark.parametrize("names", [pytest.param(True, marks=pytest.mark.slow), ("R50", "R210")])
+@pytest.mark.slow
+@pytest.mark.parametrize("names", [True, ("R50", "R210")])
 def test_the_paper_s_case_in_e24_is_exact_with_composites(names: bool | tuple[str, ...]) -> None:
     """Of the first linear block no pairs are enough; those of one beside it are."""
     alone, made = design(False), design(names)
@@ -174,6 +175,7 @@ def test_matched_parts_stay_single(matched: tuple[tuple[str, str], ...]) -> None
         assert made.composites, "others may still be two parts"
 
 
+@pytest.mark.slow
 def test_a_design_folder_with_composites_is_read_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

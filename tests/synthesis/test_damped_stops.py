@@ -29,6 +29,7 @@ from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw_many
 from designer.workbench.force_balance import ForceBalance
 from designer.workbench.prediction import POINTS as WAVE_POINTS, BoardPrediction
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
 
@@ -82,7 +83,7 @@ def excitation_of(result: Synthesis) -> Excitation:
     return design.excitation(response.b, response.omega)
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS))
 def test_chosen_parts_do_what_the_model_does(name: str) -> None:
     result = made(name)
     shows_what_the_model_does(result)
@@ -103,6 +104,7 @@ def with_damper(result: Synthesis, factor: float) -> Synthesis:
     return replace(result, design=replace(result.design, circuit=replace(circuit, parts=parts)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["restitution", "both sides"])
 def test_ngspice_s_transfer_functions_know_the_damper(name: str, pool: SpicePool) -> None:
     """In each contact they are the model's; with another damper they are not, and only there."""
@@ -115,7 +117,7 @@ def test_ngspice_s_transfer_functions_know_the_damper(name: str, pool: SpicePool
     assert not any(f.name == "transfer, open" for f in wrong.findings if not f.passed)
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS))
 def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
     """Two periods from a state in contact: the deck gives every damper the voltage that it has."""
     result = made(name)
@@ -156,6 +158,7 @@ def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
         assert np.abs(got - wanted)[2:].max() < 5e-3 * np.abs(wanted).max(), net
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["both sides", "between masses"])
 def test_boards_that_leap_are_those_of_the_general_kernel(name: str) -> None:
     """Orbits and multipliers: these come from the jump of the rates where a contact begins."""

@@ -45,6 +45,7 @@ from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.naming import identify_response
 from designer.workbench.prediction import POINTS, BoardPrediction
 from designer.yields.adjustment import Adjustment
+from tests.shared.exploring import quick
 from tests.shared.simulated_scope import SimulatedScope
 from tests.shared.system_text import clearance, system_text, table
 from tests.synthesis.test_law_circuits import shows_what_the_model_does
@@ -126,7 +127,7 @@ def made(name: str) -> Synthesis:
     return synthesise(parse_model_file(TEXTS[name]))
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS, 2))
 def test_chosen_parts_do_what_the_model_does(name: str) -> None:
     result = made(name)
     shows_what_the_model_does(result)
@@ -137,7 +138,7 @@ def test_chosen_parts_do_what_the_model_does(name: str) -> None:
     }.get(name, set())  # fmt: skip
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS, 2))
 def test_the_generator_makes_the_forces_of_the_model(name: str) -> None:
     """Volts through the resistors of each mass, as forces over a period, are those of the file."""
     result = made(name)
@@ -154,7 +155,7 @@ def test_the_generator_makes_the_forces_of_the_model(name: str) -> None:
     assert found == pytest.approx(wanted, abs=0.03 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS, 2))
 def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
     """Two periods from the orbit; the generator's nets have the voltages of the drive."""
     result = made(name)
@@ -181,7 +182,7 @@ def test_ngspice_moves_as_the_exact_circuit_does(name: str) -> None:
         assert np.abs(got - wanted[:, k]).max() < 5e-3 * np.abs(wanted[:, k]).max(), net
 
 
-@pytest.mark.parametrize("name", ["against each other", *SECOND])
+@pytest.mark.parametrize("name", quick([*SECOND, "against each other"]))
 def test_decks_for_other_simulators_have_the_same_generator(name: str) -> None:
     design, (response,) = made(name).design, made(name).model_responses
     excitation = design.excitation(response.b, response.omega)
@@ -220,7 +221,7 @@ def test_the_sheet_s_generators_are_those_of_the_deck() -> None:
     assert library.count(".subckt generator") == 2
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", quick(TEXTS, 2))
 def test_ngspice_s_transfer_functions_are_the_model_s(name: str, pool: SpicePool) -> None:
     """Of each channel; with another resistor in the second one they are not, and only there."""
     right = equation_check.check(made(name).design, made(name).model_responses, pool)
@@ -242,7 +243,7 @@ def test_ngspice_s_transfer_functions_are_the_model_s(name: str, pool: SpicePool
     assert [f.name for f in found.findings if not f.passed] == ["transfer, open, second channel"]
 
 
-@pytest.mark.parametrize("name", ["against each other", "two phases"])
+@pytest.mark.parametrize("name", quick(["two phases", "against each other"]))
 def test_boards_answer_as_one_by_one(name: str) -> None:
     result = made(name)
     design, (response,) = result.design, result.model_responses
@@ -285,6 +286,7 @@ def test_no_current_is_lost_at_a_summing_node() -> None:
     assert moved == len(circuit.states)
 
 
+@pytest.mark.slow
 def test_loads_know_both_channels() -> None:
     """The current of every output against a fine sample of the nodal equations."""
     result = made("two phases")
@@ -310,7 +312,7 @@ def test_loads_know_both_channels() -> None:
                 assert most == pytest.approx(loads.of(name).current, rel=1e-2)
 
 
-@pytest.mark.parametrize("name", ["square", "two phases", "force beside base"])
+@pytest.mark.parametrize("name", quick(["square", "two phases", "force beside base"], 2))
 def test_the_bench_is_told_what_each_channel_gives(name: str) -> None:
     result = made(name)
     design, file = result.design, result.modelfile
@@ -393,7 +395,7 @@ def test_no_record_of_such_a_board_is_named() -> None:
         assert prediction.zones
 
 
-@pytest.mark.parametrize("name", ["phase", "stops that stay"])
+@pytest.mark.parametrize("name", quick(["phase", "stops that stay"]))
 def test_a_sine_of_another_phase_is_predicted_from_its_phase_0_on(name: str) -> None:
     """Against the exact circuit under the drive of the model's phase; its record is named."""
     result = made(name)

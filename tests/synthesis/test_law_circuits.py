@@ -45,6 +45,7 @@ def shows_what_the_model_does(made: Synthesis) -> None:
     assert found == pytest.approx(wanted, abs=0.02 * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_friction_is_made_by_a_limiter() -> None:
     made = synthesise(parse_model_file(ONE + FRICTION + FORCE))
     shows_what_the_model_does(made)
@@ -89,6 +90,7 @@ def test_drawn_systems_that_a_search_gave_up_on_have_circuits(family: Family, nu
     shows_what_the_model_does(synthesise(parse_model_file(draw(1, number, family).text), jobs=2))
 
 
+@pytest.mark.slow
 def test_a_swing_is_lowered_from_where_the_design_is() -> None:
     """Not from a limit that it is well inside."""
     made = synthesise(parse_model_file(ONE + FRICTION + FORCE)).design

@@ -22,6 +22,7 @@ from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
 from designer.synthesis import parts_choice
 from designer.synthesis.limits import LOAD, SIGNAL
+from tests.shared.exploring import quick
 from tests.shared.model_text import dimensionless
 from tests.shared.oracles import Plain, coefficient_error
 
@@ -98,7 +99,7 @@ def check(design: Design, spec: CircuitSpec, held: Peaks) -> None:
     assert design.distinct_values == len(kinds)
 
 
-@pytest.mark.parametrize("series", [("E24",), ("E96",), ("E24", "E96")])
+@pytest.mark.parametrize("series", quick(map(pytest.param, [("E24",), ("E96",), ("E24", "E96")])))
 def test_the_paper_s_case(series: tuple[str, ...]) -> None:
     design = paper_design(series)
     check(
@@ -162,6 +163,7 @@ def test_random_targets(seed: int) -> None:
 # Refusals.
 
 
+@pytest.mark.slow
 def test_unreachable_names_what_binds() -> None:
     narrow = {
         "frequency": CircuitSpec(resistors=("E24",), frequency=(1e6, 2e6)),
@@ -228,6 +230,7 @@ def kinds(design: Design, preferred: tuple[float, ...] = ()) -> int:
     return len(set(design.circuit.values.values()) - set(preferred))
 
 
+@pytest.mark.slow
 def test_a_limit_on_distinct_values_is_kept_or_refused_by_name() -> None:
     most = kinds(coarse()) - 2
     assert kinds(synthesise(PAPER, replace(E12, most_values=most), CATALOG, PEAKS)) <= most
@@ -254,6 +257,7 @@ def test_preferred_values_are_used_more() -> None:
     assert wished.errors.max_error == pytest.approx(plain.errors.max_error, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_slack_buys_fewer_distinct_values() -> None:
     plain = coarse()
     loose = synthesise(PAPER, replace(E12, slack=2e-2), CATALOG, PEAKS)
@@ -261,7 +265,7 @@ def test_slack_buys_fewer_distinct_values() -> None:
     assert loose.errors.max_error <= plain.errors.max_error + 2e-2 + 1e-6
 
 
-@pytest.mark.parametrize("sides", ["upper", "lower"])
+@pytest.mark.parametrize("sides", quick(["upper", "lower"]))
 def test_one_sided_stops(sides: str) -> None:
     model = replace(PAPER, sides=sides)  # type: ignore[arg-type]
     held = Peaks(np.array([3.44, 2.65, 1.82, 1.87]), (Reach(0.61, 3.44),), 25.0)
@@ -324,6 +328,7 @@ PEAKS_19 = Peaks(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "held", "series"),
     [
@@ -359,6 +364,7 @@ def test_a_signal_as_small_as_the_offset_is_refused() -> None:
         synthesise(wide, E12, CATALOG, PAPER_PEAKS)
 
 
+@pytest.mark.slow
 def test_no_drawn_output_passes_its_rail() -> None:
     """OPA4192 is rail to rail: 5 % above its saturation would be beyond the supply."""
     spec = CircuitSpec(opamp="OPA4192", supply=15.0)

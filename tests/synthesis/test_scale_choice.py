@@ -35,7 +35,7 @@ from designer.synthesis.scale_program import (
     ScaleProgram,
     StatedLimit,
 )
-from tests.shared.exploring import seeds
+from tests.shared.exploring import quick, seeds
 from tests.shared.system_text import clearance, system_text, table
 from tests.shared.term_enumeration import everything
 
@@ -184,7 +184,7 @@ def room(
     return float(worst.min())
 
 
-@pytest.mark.parametrize("seed", seeds(6))
+@pytest.mark.parametrize("seed", quick(seeds(6), 2))
 def test_conflicts_are_irreducible_and_say_how_far_each_has_to_give(seed: int) -> None:
     random = np.random.default_rng(seed)
     angles = random.uniform(0.0, 2.0 * np.pi, 5)
@@ -321,6 +321,7 @@ def test_an_idle_clamp_carries_what_the_other_half_does_at_the_deepest() -> None
     assert min(idle_shares(stops, held).values()) < 0.0
 
 
+@pytest.mark.slow
 def test_an_error_above_the_largest_accepted_one_is_refused() -> None:
     with pytest.raises(Unreachable, match="max_error") as refused:
         design(ONE, max_error=1e-7, resistors=("E12",))
@@ -328,6 +329,7 @@ def test_an_error_above_the_largest_accepted_one_is_refused() -> None:
     assert design(ONE, max_error=0.01).errors.max_error <= 0.01
 
 
+@pytest.mark.slow
 def test_a_refusal_says_what_conflicts_and_how_far_it_has_to_give() -> None:
     with pytest.raises(Unreachable) as refused:
         design(ONE, frequency=(6e4, 7e4))
@@ -338,6 +340,7 @@ def test_a_refusal_says_what_conflicts_and_how_far_it_has_to_give() -> None:
     assert all(check.holds for check in needed.checks)
 
 
+@pytest.mark.slow
 def test_a_refusal_says_what_the_catalogue_lacks() -> None:
     """Far slower than any capacitor that is sold allows: its largest, not the range, is in the way,
     and the band alone says how slow the circuit has to be."""
@@ -357,7 +360,7 @@ def test_a_refusal_says_what_the_catalogue_lacks() -> None:
     assert f"but the catalogue has no capacitor above {top}" in text
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 def test_a_lower_bound_is_never_above_the_optimum(seed: int) -> None:
     random = np.random.default_rng(seed)
     A = np.array([[0.0, 1.0], [-random.uniform(0.5, 2.0), -random.uniform(0.05, 0.3)]])
@@ -387,6 +390,7 @@ SLOW_BASE = system_text(
 offsets are 0.12 of the drive."""
 
 
+@pytest.mark.slow
 def test_scales_keep_offsets_small_beside_the_drive() -> None:
     file = parse_model_file(SLOW_BASE)
     found = find(file.model, file.responses)

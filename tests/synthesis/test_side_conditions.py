@@ -207,6 +207,7 @@ def test_load_binds_where_the_stop_is_stiff() -> None:
     assert made.circuit.values["R50"] < LOAD
 
 
+@pytest.mark.slow
 def test_bandwidth_binds_where_harmonics_are_fast() -> None:
     fast = replace(PEAKS, fastest=4e4)
     # Even an inverter is too slow for it in the slowest time scale of the band.
@@ -229,6 +230,7 @@ def test_bandwidth_slows_the_circuit_down() -> None:
     assert held.holds
 
 
+@pytest.mark.slow
 def test_noise_gain_binds(monkeypatch: pytest.MonkeyPatch) -> None:
     """No dead zone does with a noise gain of 1.5: an inverter alone has 2."""
     for module in (limits, side_conditions):
@@ -238,6 +240,7 @@ def test_noise_gain_binds(monkeypatch: pytest.MonkeyPatch) -> None:
     assert made.errors.max_error == pytest.approx(design().errors.max_error)
 
 
+@pytest.mark.slow
 def test_level_binds_where_the_clearance_is_never_reached() -> None:
     wide = replace(PAPER, b=1e6)
     assert "binds: level" in refused(wide, E12)
@@ -245,6 +248,7 @@ def test_level_binds_where_the_clearance_is_never_reached() -> None:
     assert free.volts()[0] * PEAKS.states[0] < 10.0 * TL074C.offset_limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("composites", [(), ("R4",)])
 def test_what_costs_error_is_named_with_what_it_costs(composites: tuple[str, ...]) -> None:
     """E12 without a stop between 200 kΩ and 1 MΩ: both conditions leave worse ratios. The parts
@@ -272,6 +276,7 @@ def test_the_generator_limits_the_amplitude() -> None:
     assert made.errors.max_error == pytest.approx(free.errors.max_error)
 
 
+@pytest.mark.slow
 def test_swing_is_kept_by_the_outputs_of_the_finished_circuit() -> None:
     """An aim that real outputs miss is lowered until they keep it."""
     file = read_model_file(Path(__file__).parents[2] / "examples" / "drill.toml")

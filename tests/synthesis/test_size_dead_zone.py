@@ -25,7 +25,7 @@ from tests.shared.dead_zone_enumeration import (
     rectifier_errors,
     saturating_errors,
 )
-from tests.shared.exploring import seeds
+from tests.shared.exploring import quick, seeds
 from tests.shared.oracles import dead_zone_curve, dead_zone_gains
 
 E24 = series_values(["E24"], 1e3, 1e6)
@@ -129,7 +129,7 @@ def near_choice(values: Array, names: tuple[str, ...], rng: np.random.Generator)
     return float(slope * np.exp(rng.uniform(-0.03, 0.03)))
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 @pytest.mark.parametrize(
     ("values", "tied"),
     [(FEW, (("R206", "R209"), ("R202", "R208"))), (DECADE, (SETTERS, ("R201", "R203")))],
@@ -159,7 +159,7 @@ def test_never_worse_than_every_choice(
     assert saturating_errors(one, wanted.mu, wanted.slope) == pytest.approx(found.error, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 def test_never_worse_than_every_choice_that_keeps_the_conditions(seed: int) -> None:
     rng = np.random.default_rng(seed)
     names, tied = parts_of("saturation", "both"), (SETTERS, ("R203", "R204"))
@@ -187,7 +187,7 @@ def test_never_worse_than_every_choice_that_keeps_the_conditions(seed: int) -> N
     assert found.bound <= truth + 1e-9
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 def test_one_sided_is_never_worse_than_every_choice(seed: int) -> None:
     rng = np.random.default_rng(seed)
     side: Sides = "upper" if seed % 2 else "lower"
@@ -232,7 +232,7 @@ def test_one_sided_stage_saturates_at_the_stop_alone(side: Sides, resistors: Arr
 
 
 @pytest.mark.parametrize("sides", ["both", "upper", "lower"])
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", quick(seeds(3)))
 def test_rectifier_is_never_worse_than_every_choice(sides: Sides, seed: int) -> None:
     rng = np.random.default_rng(seed)
     values = series_values(["E6"], 1e4, 1e5)
@@ -403,6 +403,7 @@ def test_noise_gain_is_kept() -> None:
     assert free.error <= sized(wanted, E24).error + 1e-6
 
 
+@pytest.mark.slow
 def test_what_leaves_none_is_named() -> None:
     assert size(target(gain=1e-3), E24, BASE, frozenset()) == "stop slope"
     assert size(target(threshold=1e-5), E24, BASE, frozenset()) == "dead-zone null"

@@ -79,6 +79,7 @@ def test_waveform_error_forgives_whole_periods_and_the_twin() -> None:
     assert np.isnan(exact_circuit.waveform_error(wanted[:POINTS], plain))
 
 
+@pytest.mark.slow
 def test_answers_do_not_depend_on_the_block() -> None:
     p = replace(plan(), samples=60)
     whole = exact_circuit.block(p, range(60), 2)

@@ -222,6 +222,7 @@ def test_only_two_answers_that_are_the_same_count(
     assert calls == [1]
 
 
+@pytest.mark.slow
 def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> None:
     """From far off, and judged at once: two short runs see no period at either step size."""
     who = subject(1)
@@ -277,6 +278,7 @@ def both(samples: range, questions: int = 2) -> list[Ask]:
     ]
 
 
+@pytest.mark.slow
 def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
     """Against runs made here: from the nominal start, of 60 periods, the last six judged."""
     p = asking()
@@ -359,6 +361,7 @@ def test_too_long_a_way_is_left_out_by_name(
     assert len(calls) == len(heard) == 4
 
 
+@pytest.mark.slow
 def test_blocks_are_byte_equal_on_any_number_of_workers(pool: SpicePool, tmp_path: Path) -> None:
     p = asking(4)
     answers = samples_task(p, range(4))(2, nothing)
@@ -380,6 +383,7 @@ def _store(root: Path, p: StudyPlan) -> BlockStore[CrossCheck]:
     return BlockStore(root, "ngspice.parquet", CrossCheck, study_hash(p, "ngspice"), size=10)
 
 
+@pytest.mark.slow
 def test_what_was_heard_is_not_asked_again(pool: SpicePool, tmp_path: Path) -> None:
     """Fewer first, then more; until the last word is said nothing that is known is dropped."""
     p = asking(4)

@@ -52,6 +52,7 @@ def verdict(fit: BoardFit, advice: Advice, without: tuple[str, ...] = ()) -> Ver
     return settled(Ensemble(boards, fast=False), [case])[0][1]
 
 
+@pytest.mark.slow
 def test_a_lost_board_is_brought_back() -> None:
     (advice,) = advise(lost(), [question(P)], Bands())
     assert advice.as_set == 0.0
@@ -67,6 +68,7 @@ def test_a_lost_board_is_brought_back() -> None:
     )
 
 
+@pytest.mark.slow
 def test_where_no_lever_may_be_turned_a_part_is_named() -> None:
     (advice,) = advise(lost(), [question(P)], Bands(0.0, 0.0, 0.0))
     assert not advice.helps

@@ -18,6 +18,7 @@ from designer.workbench.force_balance import Balance, ForceBalance, _linear
 from designer.workbench.naming import identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
+from tests.shared.exploring import quick
 from tests.shared.paper_cases import synthesised
 
 SEED = 7
@@ -91,7 +92,7 @@ def test_a_sine_alone_is_taken_for_the_generator() -> None:
         recorded_motion(record, prediction())
 
 
-@pytest.mark.parametrize("number", [8, 35, 43, 73])
+@pytest.mark.parametrize("number", quick([8, 35, 43, 73]))
 def test_a_setting_that_is_in_no_file(number: int) -> None:
     """These were sure of another frequency, or of another net on a channel: two with the generator
     recorded (one chaotic, one 1-1-1 whose v1 looks like the predicted v3), 1-1-1 at 366 Hz without

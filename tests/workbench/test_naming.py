@@ -13,6 +13,7 @@ from designer.workbench.channel_roles import recorded_motion
 from designer.workbench.naming import NamedMotion, identify_response
 from designer.workbench.prediction import BoardPrediction
 from designer.workbench.record import Record
+from tests.shared.exploring import quick
 from tests.shared.paper_cases import synthesised
 from tests.workbench.stored_records import COUNT, stored
 
@@ -27,7 +28,7 @@ def name_of(number: int) -> NamedMotion:
     return identify_response(recorded_motion(stored(number).record, prediction()), prediction())
 
 
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("number", quick(range(COUNT), 3))
 def test_channels_and_drive_are_recognised(number: int) -> None:
     truth, motion = stored(number), name_of(number).motion
     assert motion.channels == {net: f"CH{k + 1}" for k, net in enumerate(truth.nets)}
@@ -37,7 +38,7 @@ def test_channels_and_drive_are_recognised(number: int) -> None:
         assert motion.amplitude == pytest.approx(4.95, rel=0.03)
 
 
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("number", quick(range(COUNT), 3))
 def test_the_response_is_right_or_left_open(number: int) -> None:
     """Eight of the nine are sure, the eighth by the orbit of the board behind it; the last stands
     next to grazing, and its truth is among what is left open."""
@@ -73,6 +74,7 @@ def test_one_channel_is_enough_where_contacts_are_deep(nets: tuple[str, ...]) ->
     assert not name.dead_zones
 
 
+@pytest.mark.slow
 def test_a_sine_that_drifts_is_no_period() -> None:
     """Two lines whose ratio is irrational never repeat; a decaying one settles."""
     truth, rng = stored(1), np.random.default_rng(4)

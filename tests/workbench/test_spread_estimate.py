@@ -44,6 +44,7 @@ def fits() -> list[BoardFit]:
     return out
 
 
+@pytest.mark.slow
 def test_each_kind_has_the_spread_that_the_boards_were_drawn_with(fits: list[BoardFit]) -> None:
     wide = {s.kind: s for s in estimated_spread(fits)}
     for kind, letter in (("resistors", "R"), ("capacitors", "C"), ("offsets", "U")):

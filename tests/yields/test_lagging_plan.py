@@ -46,6 +46,7 @@ def test_its_rows_are_not_taken_for_those_of_another_study() -> None:
     assert study_hash(replace(without, bandwidth=True)) != study_hash(without)
 
 
+@pytest.mark.slow
 def test_what_the_nominal_circuit_with_bandwidth_does_not_show_is_left_out_by_name() -> None:
     """Op-amps of 10 kHz: at p = 2 the lag leaves no period, at p = 5 another response."""
     p = plan(2, 5)

@@ -89,6 +89,7 @@ def test_sobol_indices_of_a_linear_margin_are_its_shares_of_the_variance() -> No
     assert all(abs(x.total) < 1e-9 for n, x in found.items() if n not in ("R4", "R5", "U1A.offset"))
 
 
+@pytest.mark.slow
 def test_sobol_indices_of_the_least_of_two_equal_limits() -> None:
     """min(x, y) of two equal uniform numbers: first-order 0.4, total 0.6, by integration."""
     found = indices(margin_of({"R4": (1.0, 0.0), "R5": (0.0, 1.0)})[0])
@@ -142,6 +143,7 @@ def _indices_of(a: Array, b: Array, ab: Array) -> list[list[float]]:
     ]
 
 
+@pytest.mark.slow
 def test_the_noise_of_an_index_shrinks_with_the_base_and_covers_the_truth() -> None:
     margin = margin_of({"R4": (3.0,), "R5": (1.0,), "U1A.offset": (2.0,)})[0]
     few, many = indices(margin, 128), indices(margin, 2048)
@@ -252,6 +254,7 @@ def test_a_crossing_is_where_the_response_ends_along_the_line() -> None:
     assert not kept(met.outside)
 
 
+@pytest.mark.slow
 def test_where_only_offsets_differ_offsets_have_all_the_attribution() -> None:
     found = offsets_attributed().responses[0]
     assert found.lost == sum(a.verdict is Verdict.LOST for a in answers(2, "offsets")) > 6
@@ -266,6 +269,7 @@ def test_where_only_offsets_differ_offsets_have_all_the_attribution() -> None:
     assert high == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
     found = offsets_attributed().responses[0]
     study = plan(2, "offsets")
@@ -422,6 +426,7 @@ class _Memory(StoredParts):
         self.known |= values
 
 
+@pytest.mark.slow
 def test_an_attribution_that_was_interrupted_goes_on_where_it_was(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -463,6 +468,7 @@ def test_an_attribution_that_was_interrupted_goes_on_where_it_was(
     assert all(pieces.known[name] is value for name, value in before.items())
 
 
+@pytest.mark.slow
 def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
     study = plan(2, "offsets")
     rows = tuple(replace(a, periods=50) for a in answers(2, "offsets"))
@@ -496,6 +502,7 @@ def test_boards_that_take_long_are_fewer_within_a_budget() -> None:
     assert 1 <= lost[1] < 0.5 * lost[0]
 
 
+@pytest.mark.slow
 def test_a_larger_budget_does_the_rest() -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]

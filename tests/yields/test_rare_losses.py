@@ -33,6 +33,7 @@ from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
+from tests.shared.exploring import quick
 from tests.shared.model_text import COARSE_RECTIFIER, SMALL
 from tests.shared.system_text import clearance, system_text, table
 
@@ -130,7 +131,7 @@ REPETITIONS = 60
 
 @pytest.mark.parametrize(
     ("size", "threshold"),
-    [(12, 10.3), (20, 15.6), pytest.param(12, 9.6, marks=pytest.mark.slow)],
+    quick([(12, 10.3), (20, 15.6), (12, 9.6)]),
 )
 def test_the_interval_covers_a_probability_that_is_known(
     monkeypatch: pytest.MonkeyPatch, size: int, threshold: float
@@ -153,7 +154,8 @@ def test_the_interval_covers_a_probability_that_is_known(
     assert all(len(r.regions) >= 1 and r.regions[0].becomes == "1-0-0" for r in found)
 
 
-@pytest.mark.parametrize("ends", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("ends", [False, True])
 def test_two_regions_of_one_kind_of_loss_are_found(
     monkeypatch: pytest.MonkeyPatch, ends: bool
 ) -> None:
@@ -193,6 +195,7 @@ def test_a_search_knows_the_commonest_loss_of_those_before_it(
     assert quick[1] == pytest.approx(irwin_hall(12, 9.7), rel=0.9)
 
 
+@pytest.mark.slow
 def test_the_rounds_find_a_region_that_walks_know_badly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lost where twelve coordinates are large together and another is within a tenth of its
     middle, which no tilt leads to. Walks know the means of the 47 others badly; each round adds to
@@ -228,7 +231,7 @@ def test_a_limit_of_the_nominal_board_leads_to_the_losses(monkeypatch: pytest.Mo
     assert all(r.regions[0].found_by == "a limit" for r in found)
 
 
-@pytest.mark.parametrize("lost_of_them", [0.7, 1.0])
+@pytest.mark.parametrize("lost_of_them", quick([0.7, 1.0]))
 def test_boards_that_show_no_period_briefly_are_asked_on_by_chance(
     monkeypatch: pytest.MonkeyPatch, lost_of_them: float
 ) -> None:
@@ -347,7 +350,7 @@ def test_boards_that_are_slow_but_sound_are_no_plenty(monkeypatch: pytest.Monkey
     assert result.unseen < never.unseen
 
 
-@pytest.mark.parametrize("factor", [0.4, 2.5])
+@pytest.mark.parametrize("factor", quick([0.4, 2.5]))
 def test_an_estimate_ends_on_the_right_side_of_a_bound(
     monkeypatch: pytest.MonkeyPatch, factor: float
 ) -> None:
@@ -370,6 +373,7 @@ def test_an_estimate_ends_on_the_right_side_of_a_bound(
     assert sum(r.boards for r, _ in pairs) < 0.9 * sum(whole.boards for _, whole in pairs)
 
 
+@pytest.mark.slow
 def test_two_regions_that_lie_apart_are_both_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lost where the first six are large, and, as something else, where the last six are small."""
     truth = irwin_hall(6, 5.2) + irwin_hall(6, 5.4)
@@ -388,6 +392,7 @@ def test_two_regions_that_lie_apart_are_both_counted(monkeypatch: pytest.MonkeyP
     assert sum(kind == {"1-0-0", "clipped"} for kind in kinds) >= 18
 
 
+@pytest.mark.slow
 def test_the_commonest_loss_of_bad_parts_does_not_hide_that_of_good_ones(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -408,6 +413,7 @@ def test_the_commonest_loss_of_bad_parts_does_not_hide_that_of_good_ones(
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.1)
 
 
+@pytest.mark.slow
 def test_losses_on_both_sides_of_the_middle_are_two_regions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -627,6 +633,7 @@ def drawing_of(text: str) -> drawn_boards.Drawing:
     return drawn_boards.Drawing(plan, plan.questions[0], 1, lambda: None, log)
 
 
+@pytest.mark.slow
 def test_what_is_foretold_of_boards_is_what_they_show() -> None:
     """For any number of threads; but for what the compiled way leaves open, if that is not asked
     about: it is no loss then."""
@@ -643,6 +650,7 @@ def test_what_is_foretold_of_boards_is_what_they_show() -> None:
     assert {"", "1-1-1"} == set(quickly)
 
 
+@pytest.mark.slow
 def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
     ground = ("a", "ground")
     text = system_text(
@@ -659,6 +667,7 @@ def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
 # In a folder
 
 
+@pytest.mark.slow
 def test_the_verb_writes_it_and_takes_it_over(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

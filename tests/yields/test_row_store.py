@@ -299,6 +299,7 @@ STRANGE: dict[str, Change] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", STRANGE)
 def test_rows_that_no_study_writes(tmp_path: Path, plan: StudyPlan, what: str) -> None:
     """With a seal that is right: they are said and computed again."""

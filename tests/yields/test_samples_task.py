@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from designer.circuit.netlist import Resistor
 from designer.circuit.reduction import Reduction
@@ -18,6 +19,7 @@ from designer.yields.layers import samples_task
 from tests.verdicts.test_verdict import nothing, plan
 
 
+@pytest.mark.slow
 def test_jobs_do_not_change_the_answers() -> None:
     one = [a for block in plan().blocks() for a in samples_task(plan(), block)(1, nothing)]
     two = [a for block in plan().blocks() for a in samples_task(plan(), block)(2, nothing)]

@@ -266,6 +266,7 @@ def test_a_sweep_from_above_all_resonances_is_not(p: int) -> None:
     assert {e.orbit.response for e in ended} == {f"1-{p}-{p}"}
 
 
+@pytest.mark.slow
 def test_recipes_found_keep_their_word_at_other_phases() -> None:
     """On phases that the search has not seen; and 1-3-3 needs no more than to be switched on."""
     of = plan(1, 3)
@@ -374,6 +375,7 @@ def test_a_short_sweep_from_afar_is_tried_though_the_amplitude_s_is_long(
     assert found.way is RecipeKind.FROM_FAR
 
 
+@pytest.mark.slow
 def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
     """Within the intervals of both; the boards here are of large offsets."""
     of = plan(2)

@@ -466,6 +466,7 @@ def _refused(*_: Any, **__: Any) -> Any:
     raise AssertionError("this was known")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_reports")
 def test_another_layer_asks_for_no_attribution_again_and_other_boards_do(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -498,6 +499,7 @@ def test_a_model_without_a_title_has_the_same_name_in_its_folder(exact: Path) ->
     assert (exact / "kicad" / "small.kicad_sch").is_file()
 
 
+@pytest.mark.slow
 def test_yields_stand_before_the_attribution_and_it_goes_on_after_an_interruption(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
@@ -535,6 +537,7 @@ def test_yields_stand_before_the_attribution_and_it_goes_on_after_an_interruptio
     assert without_cost(out) == without_cost(exact)
 
 
+@pytest.mark.slow
 def test_a_study_without_attribution_gets_it_later_and_loses_it_never(
     exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
@@ -649,6 +652,7 @@ def test_a_folder_that_changes_under_a_study_is_noticed(
         look()
 
 
+@pytest.mark.slow
 def test_a_deleted_folder_is_said_at_the_next_block(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -236,6 +236,7 @@ def test_verdicts_are_those_of_plain_runs(rows: list[Trimmed]) -> None:
     assert checked >= 12
 
 
+@pytest.mark.slow
 def test_the_one_setting_is_nearly_as_good_as_any(rows: list[Trimmed]) -> None:
     """Against a grid of settings, by the general kernel: on which boards does any show both
     responses? Where the procedure's setting does, the grid has one that does, but for its mesh."""
@@ -280,6 +281,7 @@ def test_the_boards_are_those_of_the_study() -> None:
         assert (trimmed.offset[name] == column).all()
 
 
+@pytest.mark.slow
 def test_only_a_fitted_trimmer_is_one() -> None:
     made = synthesised()
     assert dc_trim(made) is None

@@ -150,6 +150,7 @@ def test_a_response_in_front_changes_no_reading_of_the_others(
     assert not found[1]["1-1-1"] & found[1]["1-3-3"]
 
 
+@pytest.mark.slow
 def test_bands_of_no_width_are_as_built(rough: tuple[list[Answer], list[Tuned]]) -> None:
     built, _ = rough
     of = plan(3, 6, spread=ROUGH)

@@ -30,6 +30,7 @@ from designer.yields.two_engine_yield import (
     interval,
 )
 from designer.yields.yield_count import Yield
+from tests.shared.exploring import quick
 from tests.verdicts.test_ngspice_sampling import BLANK, HEARD, question
 
 OK, LOST = "1-2-2", "1-1-1"
@@ -79,16 +80,18 @@ def joined(answers: list[Answer], said: dict[int, bool], boundary: bool = True) 
     return both
 
 
-@pytest.mark.parametrize("boundary", [True, False])
+@pytest.mark.parametrize("boundary", quick([True, False]))
 @pytest.mark.parametrize(
     ("boards", "rate", "gain", "loss"),
-    [
-        (250, 0.9, 0.1, 0.01),
-        (250, 0.5, 0.05, 0.05),
-        (250, 0.8, 0.0, 0.04),
-        (250, 0.97, 0.0, 0.0),
-        (250, 1.0, 0.0, 0.06),  # as much as fifty boards hide one time in twenty
-    ],
+    quick(
+        [
+            (250, 0.9, 0.1, 0.01),
+            (250, 0.5, 0.05, 0.05),
+            (250, 0.8, 0.0, 0.04),
+            (250, 0.97, 0.0, 0.0),
+            (250, 1.0, 0.0, 0.06),  # as much as fifty boards hide one time in twenty
+        ]
+    ),
 )
 def test_estimates_are_unbiased_and_intervals_cover(
     boards: int, rate: float, gain: float, loss: float, boundary: bool

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from designer.cli import entry
+from tests.shared.exploring import quick
 from tests.shared.quick_folders import quick_folder
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,6 +25,7 @@ def study(folder: Path, model: Path, *options: str) -> dict[str, object]:
     return response
 
 
+@pytest.mark.slow
 def test_every_layer_counts_boards_that_stay_chaotic(tmp_path: Path) -> None:
     """As built, tuned, from power-up and blamed; the boards that fall into a period are lost."""
     options = ("--samples", "20", "--tuned", "--reached", "--blame-budget", "300")
@@ -47,6 +49,7 @@ def test_every_layer_counts_boards_that_stay_chaotic(tmp_path: Path) -> None:
     assert "designer search" not in page  # which follows orbits, and would refuse
 
 
+@pytest.mark.slow
 def test_a_least_exponent_decides_boards(tmp_path: Path) -> None:
     """The model's is 0.154. A first estimate of a board's, to 6 %, cannot be told from 0.14, and is
     made better until it can."""
@@ -59,7 +62,9 @@ def test_a_least_exponent_decides_boards(tmp_path: Path) -> None:
     assert not counted["failed"]
 
 
-@pytest.mark.parametrize("options", [("search", "--out"), ("search", "--yield", "0.95")])
+@pytest.mark.parametrize(
+    "options", quick(map(pytest.param, [("search", "--out"), ("search", "--yield", "0.95")]))
+)
 def test_what_follows_orbits_refuses(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
 ) -> None:

@@ -100,6 +100,7 @@ def test_a_forecast_is_the_map_where_the_compiled_way_answers() -> None:
     assert len(told) >= 2 * plain.ok.sum()
 
 
+@pytest.mark.slow
 def test_boards_that_a_forecast_leaves_open_are_settled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here all of them, as in a design whose boards reach a mode that the compiled way lacks. A
     setting at which the first board shows the response is as in the plain map; at another one
@@ -199,6 +200,7 @@ def test_over_the_grade_the_same_numbers_are_drawn() -> None:
     assert (both.ok[0] == found.ok).all()
 
 
+@pytest.mark.slow
 def test_over_the_temperature_the_same_boards_get_warm() -> None:
     """Point by point what a plan of boards at that temperature says, with the same numbers; warm
     boards of a limit that falls steeply lose the response, and nothing is recommended."""
