@@ -53,7 +53,7 @@ TABLES = (
     ("R200", "R211", "R212"),
 )
 """Parts of each table."""
-Dividers = dict[tuple[bool | bytes, ...], ValueTable]
+Dividers = dict[tuple[bytes, ...], ValueTable]
 """Tables of R204, R205 and R208 by whether noise counts, and the values of each."""
 
 
@@ -313,7 +313,7 @@ def _divider(
 ) -> ValueTable:
     """Rows of R204, R205 and R208."""
     names = "R204", "R205", "R208"
-    key = (noisy, *(lists[name].tobytes() for name in names))
+    key = (repr(noisy).encode(), *(lists[name].tobytes() for name in names))
     if key not in known:
         every = combinations(names, lists, equal.group)
         light = source_resistance(every.columns) if noisy else None
