@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from designer.check.checked_design import as_named_in_ngspice
-from designer.dynamics.counts import read_counts
+from designer.dynamics.counts import MAX_PERIOD, read_counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.read_orbit import name_in_ngspice
@@ -204,8 +204,9 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
 
 def least_way(n: int, radius: float) -> float:
     """Drive periods from the nominal orbit to an attractor of period n, at least: 5n/(1 - ρ),
-    rounded up; inf for an unstable one."""
-    if n == 0:
+    rounded up; inf for an unstable one. Without a period, or with one that ngspice does not look
+    for, `UNKNOWN_PERIODS`."""
+    if not 0 < n <= MAX_PERIOD:
         return UNKNOWN_PERIODS
     return math.ceil(5.0 * n / (1.0 - radius)) if radius < 1.0 else math.inf
 

@@ -252,7 +252,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
     way is longer than that.
     """
     least = least_way(orbit.n, orbit.radius)
-    if orbit.n == 0 or least > MOST_PERIODS:
+    if not 0 < orbit.n <= MAX_PERIOD or least > MOST_PERIODS:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0

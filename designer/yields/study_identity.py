@@ -16,7 +16,7 @@ from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 3,
-    "ngspice": 5,
+    "ngspice": 6,
     "tuned": 3,
     "reached": 3,
     "trimmed": 2,

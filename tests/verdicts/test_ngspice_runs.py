@@ -35,6 +35,7 @@ from designer.verdicts.cross_check import (
     Why,
     ask_random,
     is_answer,
+    least_way,
 )
 from designer.verdicts.ngspice_runs import (
     REMAINDER,
@@ -98,6 +99,14 @@ def test_ways_without_a_multiplier_or_an_end() -> None:
     who = subject(1)
     flow, orbit = flow_of(who), who.orbit
     assert periods_to_settle(flow, orbit.start, Orbit(OrbitStatus.APERIODIC)) == 20
+    # ngspice looks for no period above 16: a thousand are no reason to run four thousand.
+    for n, way, judged in ((16, 16 * 10, 4 * 16), (17, 20, 2 * 16), (972, 20, 2 * 16)):
+        of_period = replace(orbit, n=n, multipliers=np.array([0.5 + 0j]))
+        assert least_way(n, of_period.radius) == way
+        run = replace(who, orbit=of_period, discard=way, brief=True)
+        assert numerics_gate.length(run) == way + judged
+    long = replace(orbit, n=972, multipliers=np.array([0.5 + 0j]))
+    assert periods_to_settle(flow, orbit.start, long) == 20
     slow = replace(orbit, multipliers=np.array([1.0 - 5.0 / (MOST_PERIODS + 1.0) + 0j]))
     assert periods_to_settle(flow, orbit.start, slow) == MOST_PERIODS + 1
     for radius in (1.0, 1.5, math.nan):
