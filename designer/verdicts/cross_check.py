@@ -36,8 +36,8 @@ BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
-MOST_PERIODS, MOST_STEPS = 4000, 2_000_000
-"""Longest way to an attractor that ngspice is sent, in drive periods and in its own steps (a
+MOST_PERIODS, MOST_STEPS = 4000, 1_000_000
+"""Longest way to an attractor that ngspice is sent, in drive periods and in its own steps (half a
 minute on a circuit of four masses); beyond either a sample is left out by name."""
 STEPS_EACH = 200_000
 """Steps of a run from the nominal orbit, on average: where the ways of many boards are longer,
