@@ -54,6 +54,7 @@ def study_hash(
                 ngspice_runs.STRETCH,
                 ngspice_runs.LONG,
                 ngspice_runs.MOST_AGAIN,
+                ngspice_runs.MOST_STEPS_AGAIN,
             ],
             "undecided": cross_check.UNDECIDED,
             "settings": [

@@ -245,23 +245,25 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
 
 
 @pytest.mark.parametrize(
-    ("way", "ends", "runs", "response"),
+    ("steps", "way", "ends", "runs", "response"),
     [
-        (100, (2, 2), 2, "1-2-2"),
-        (3900, (2, 2), 2, "1-2-2"),
-        (4000, (2,), 1, UNDECIDED),  # a quarter of the step would be more than 16000 periods
-        (3900, (0, 1), 2, "1-1-1"),
-        (8000, (0,), 1, "not settled"),
-        (1000, (0, 0, 1), 3, "1-1-1"),
-        (2000, (0, 2), 2, UNDECIDED),
-        (4000, (0, 2), 2, UNDECIDED),
+        (400, 100, (2, 2), 2, "1-2-2"),
+        (400, 3900, (2, 2), 2, "1-2-2"),
+        (400, 4000, (2,), 1, UNDECIDED),  # a quarter of the step would be more than 16000 periods
+        (400, 3900, (0, 1), 2, "1-1-1"),
+        (400, 8000, (0,), 1, "not settled"),
+        (400, 1000, (0, 0, 1), 3, "1-1-1"),
+        (400, 2000, (0, 2), 2, UNDECIDED),
+        (400, 4000, (0, 2), 2, UNDECIDED),
+        (4000, 100, (2, 2), 2, "1-2-2"),
+        (4000, 1000, (2,), 1, UNDECIDED),  # four times 4 million steps are more than 8 million
     ],
 )
 def test_a_long_way_is_not_gone_again_at_any_price(
-    way: int, ends: tuple[int, ...], runs: int, response: str
+    steps: int, way: int, ends: tuple[int, ...], runs: int, response: str
 ) -> None:
     who, pool = replace(subject(1), discard=way), Saying(*ends)
-    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
+    query = Query(who, SolverSettings("trap", who.period / steps), "1-1-1", 1)
     (heard,) = run_queries(pool, [query])  # type: ignore[arg-type]
     assert heard.response == response
     assert pool.steps == runs
