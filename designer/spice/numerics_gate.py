@@ -214,6 +214,12 @@ class GateSubject:
         return self.reduction.circuit
 
     @property
+    def laps(self) -> int:
+        """Drive periods after which ngspice is to repeat; 0 where the orbit has no period or one
+        that is not looked for there."""
+        return self.orbit.n if self.orbit.n <= MAX_PERIOD else 0
+
+    @property
     def board(self) -> Board:
         return self.reduction.board
 
@@ -260,7 +266,7 @@ def job(
         generator=subject.circuit.generator.net,
         outputs=linear_outputs(subject),
         keep=keep,
-        brief=subject.brief and not subject.orbit.n,
+        brief=subject.brief and not subject.laps,
     )
     # A period before the first strobe, for the points around it: a long way takes no memory.
     kept = 0.0 if whole else max(subject.discard - 1, 0) * subject.period
@@ -315,7 +321,7 @@ def deck_of(
 def length(subject: GateSubject) -> int:
     """Drive periods that the run of a subject takes."""
     unperiodic = BRIEF if subject.brief else 4 * MAX_PERIOD
-    judged = max(4 * subject.orbit.n or unperiodic, subject.judged)
+    judged = max(4 * subject.laps or unperiodic, subject.judged)
     return max(subject.discard + judged, SHORTEST)
 
 

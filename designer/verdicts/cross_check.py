@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from designer.check.checked_design import as_named_in_ngspice
-from designer.dynamics.counts import read_counts
+from designer.dynamics.counts import MAX_PERIOD, read_counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.spice.read_orbit import name_in_ngspice
@@ -36,8 +36,8 @@ BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
-MOST_PERIODS, MOST_STEPS = 4000, 2_000_000
-"""Longest way to an attractor that ngspice is sent, in drive periods and in its own steps (a
+MOST_PERIODS, MOST_STEPS = 4000, 1_000_000
+"""Longest way to an attractor that ngspice is sent, in drive periods and in its own steps (half a
 minute on a circuit of four masses); beyond either a sample is left out by name."""
 STEPS_EACH = 200_000
 """Steps of a run from the nominal orbit, on average: where the ways of many boards are longer,
@@ -204,8 +204,9 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
 
 def least_way(n: int, radius: float) -> float:
     """Drive periods from the nominal orbit to an attractor of period n, at least: 5n/(1 - ρ),
-    rounded up; inf for an unstable one."""
-    if n == 0:
+    rounded up; inf for an unstable one. Without a period, or with one that ngspice does not look
+    for, `UNKNOWN_PERIODS`."""
+    if not 0 < n <= MAX_PERIOD:
         return UNKNOWN_PERIODS
     return math.ceil(5.0 * n / (1.0 - radius)) if radius < 1.0 else math.inf
 

@@ -33,6 +33,7 @@ from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_circuit
 from designer.verdicts.cross_check import (
     MOST_PERIODS,
+    MOST_STEPS,
     OR,
     UNDECIDED,
     Ask,
@@ -49,9 +50,9 @@ T = TypeVar("T")
 REMAINDER = 5e-4
 """How near its attractor a trajectory has arrived, over the peak: a quarter of the strobe
 tolerance."""
-MOST_AGAIN = 4 * MOST_PERIODS
-"""Longest run that is made again, in drive periods at the step of the first; a quarter of the step
-counts four times."""
+MOST_AGAIN, MOST_STEPS_AGAIN = 4 * MOST_PERIODS, 8 * MOST_STEPS
+"""Longest run that is made again, in drive periods at the step of the first, a quarter of the step
+counting four times, and in steps."""
 FINER = 4
 """The number by which the step is divided in each round where ngspice disagrees. Half a step may
 say the same by the same error: next to a period doubling it takes a sixteenth to see."""
@@ -252,7 +253,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
     way is longer than that.
     """
     least = least_way(orbit.n, orbit.radius)
-    if orbit.n == 0 or least > MOST_PERIODS:
+    if not 0 < orbit.n <= MAX_PERIOD or least > MOST_PERIODS:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0
@@ -286,7 +287,7 @@ def run_queries(
     later, if that many are allowed. Where they never do, the answer is `UNDECIDED`. A failed run is
     no answer: it is neither the same as another nor different. Nor is one that has not settled: it
     is made again at the next step, and longer (`longer`) where it has not settled there either or
-    there is no next one. Neither is done where it would take more than `MOST_AGAIN` periods' steps.
+    there is no next one. Neither is done where it would take more than `MOST_AGAIN` says.
     ``progress`` is called once a query.
     """
     # The longest first: the workers then end together.
@@ -338,25 +339,25 @@ def _after(run: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
     if same and (expected or run.round >= SURE_ROUND):
         return answer
     # At the finer step as long as was asked at first: what had not settled may be the step's doing.
-    may_refine = (
-        run.round < query.refinements
-        and FINER * fine * numerics_gate.length(query.subject) <= MOST_AGAIN
-    )
+    may_refine = run.round < query.refinements and _may_take(query, query.subject, FINER * fine)
     unsettled = answer.response == OrbitStatus.NOT_SETTLED and not (run.round == 0 and may_refine)
     # A few strobes of a motion without a period may look like one.
     brief = run.subject.brief and query.expected == OrbitStatus.APERIODIC and not none
     more = longer(run.subject)
-    if (
-        (unsettled or brief)
-        and run.subject.judged < LONG
-        and fine * numerics_gate.length(more) <= MOST_AGAIN
-    ):
+    if (unsettled or brief) and run.subject.judged < LONG and _may_take(query, more, fine):
         return replace(run, subject=more)
     if may_refine:
         finer = replace(run.settings, max_step=run.settings.max_step / FINER)
         before = run.before if none else answer.response
         return _Run(query, query.subject, finer, run.round + 1, before)
     return answer if none or same else _undecided(run.before, answer)
+
+
+def _may_take(query: Query, subject: GateSubject, fine: int) -> bool:
+    """Whether the run of a subject is made again at the query's step over ``fine``."""
+    periods = fine * numerics_gate.length(subject)
+    steps = periods * subject.period / query.settings.max_step
+    return periods <= MOST_AGAIN and steps <= MOST_STEPS_AGAIN
 
 
 def longer(subject: GateSubject) -> GateSubject:

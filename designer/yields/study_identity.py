@@ -16,7 +16,7 @@ from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 3,
-    "ngspice": 5,
+    "ngspice": 6,
     "tuned": 3,
     "reached": 3,
     "trimmed": 2,
@@ -54,6 +54,7 @@ def study_hash(
                 ngspice_runs.STRETCH,
                 ngspice_runs.LONG,
                 ngspice_runs.MOST_AGAIN,
+                ngspice_runs.MOST_STEPS_AGAIN,
             ],
             "undecided": cross_check.UNDECIDED,
             "settings": [

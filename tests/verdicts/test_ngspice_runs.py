@@ -35,6 +35,7 @@ from designer.verdicts.cross_check import (
     Why,
     ask_random,
     is_answer,
+    least_way,
 )
 from designer.verdicts.ngspice_runs import (
     REMAINDER,
@@ -98,6 +99,14 @@ def test_ways_without_a_multiplier_or_an_end() -> None:
     who = subject(1)
     flow, orbit = flow_of(who), who.orbit
     assert periods_to_settle(flow, orbit.start, Orbit(OrbitStatus.APERIODIC)) == 20
+    # ngspice looks for no period above 16: a thousand are no reason to run four thousand.
+    for n, way, judged in ((16, 16 * 10, 4 * 16), (17, 20, 2 * 16), (972, 20, 2 * 16)):
+        of_period = replace(orbit, n=n, multipliers=np.array([0.5 + 0j]))
+        assert least_way(n, of_period.radius) == way
+        run = replace(who, orbit=of_period, discard=way, brief=True)
+        assert numerics_gate.length(run) == way + judged
+    long = replace(orbit, n=972, multipliers=np.array([0.5 + 0j]))
+    assert periods_to_settle(flow, orbit.start, long) == 20
     slow = replace(orbit, multipliers=np.array([1.0 - 5.0 / (MOST_PERIODS + 1.0) + 0j]))
     assert periods_to_settle(flow, orbit.start, slow) == MOST_PERIODS + 1
     for radius in (1.0, 1.5, math.nan):
@@ -237,23 +246,25 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
 
 
 @pytest.mark.parametrize(
-    ("way", "ends", "runs", "response"),
+    ("steps", "way", "ends", "runs", "response"),
     [
-        (100, (2, 2), 2, "1-2-2"),
-        (3900, (2, 2), 2, "1-2-2"),
-        (4000, (2,), 1, UNDECIDED),  # a quarter of the step would be more than 16000 periods
-        (3900, (0, 1), 2, "1-1-1"),
-        (8000, (0,), 1, "not settled"),
-        (1000, (0, 0, 1), 3, "1-1-1"),
-        (2000, (0, 2), 2, UNDECIDED),
-        (4000, (0, 2), 2, UNDECIDED),
+        (400, 100, (2, 2), 2, "1-2-2"),
+        (400, 3900, (2, 2), 2, "1-2-2"),
+        (400, 4000, (2,), 1, UNDECIDED),  # a quarter of the step would be more than 16000 periods
+        (400, 3900, (0, 1), 2, "1-1-1"),
+        (400, 8000, (0,), 1, "not settled"),
+        (400, 1000, (0, 0, 1), 3, "1-1-1"),
+        (400, 2000, (0, 2), 2, UNDECIDED),
+        (400, 4000, (0, 2), 2, UNDECIDED),
+        (4000, 100, (2, 2), 2, "1-2-2"),
+        (4000, 1000, (2,), 1, UNDECIDED),  # four times 4 million steps are more than 8 million
     ],
 )
 def test_a_long_way_is_not_gone_again_at_any_price(
-    way: int, ends: tuple[int, ...], runs: int, response: str
+    steps: int, way: int, ends: tuple[int, ...], runs: int, response: str
 ) -> None:
     who, pool = replace(subject(1), discard=way), Saying(*ends)
-    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
+    query = Query(who, SolverSettings("trap", who.period / steps), "1-1-1", 1)
     (heard,) = run_queries(pool, [query])  # type: ignore[arg-type]
     assert heard.response == response
     assert pool.steps == runs
