@@ -104,7 +104,7 @@ def synthesised(answer: DesignKeys) -> None:
             for name, g in answer["better_grades"].items()
         }
         say(better_grades_text(better))
-    stage = answer["dead_zone"]
+    stage = answer.get("dead_zone")
     if stage is not None and (reason := stage.get("reason")):
         say(f"The stage of the clearance was chosen. {reason}.")
     certificate = answer["certificate"]
