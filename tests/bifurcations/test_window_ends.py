@@ -277,7 +277,6 @@ BASE_BEAM = system_text(
 lie within one step of a branch that comes from above."""
 
 
-@pytest.mark.slow
 def test_stability_that_is_lost_and_had_again_within_a_step_ends_a_window(tmp_path: Path) -> None:
     made = swept(tmp_path / "beam.toml", BASE_BEAM, 37.0, 45.0, 9, "up")
     found = window_ends.find(made)

@@ -23,8 +23,8 @@ from designer.folders.design_files import load
 from designer.model.model_file import read_model_file
 from designer.verbs import bifurcation as bifurcation_verb
 from designer.verbs.bifurcation import bifurcation
-from tests.cli.test_entry import BASE, _process, _strict, _tree
-from tests.shared.model_text import SMALL
+from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
+from tests.shared.model_text import COARSE_RECTIFIER
 from tests.shared.quick_folders import quick_folder
 from tests.shared.system_text import clearance, system_text, table
 
@@ -36,7 +36,7 @@ SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bifurcation") / "small.toml"
-    path.write_text(SMALL, encoding="utf-8")
+    path.write_text(BASE + WANTED + COARSE_RECTIFIER, encoding="utf-8")
     return path
 
 

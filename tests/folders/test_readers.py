@@ -34,7 +34,7 @@ from designer.model.model_file import read_model_file
 from tests.catalog.test_catalog import CSV
 from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
 from tests.folders.test_study_cache import ATTRIBUTION, kept
-from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE, SMALL
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
@@ -328,7 +328,8 @@ def test_a_report_s_folder_with_nested_json(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def design(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return quick_folder(SMALL, tmp_path_factory.mktemp("readers") / "design")
+    text = "format = 1\n" + PAPER_TABLE + COARSE_CIRCUIT
+    return quick_folder(text, tmp_path_factory.mktemp("readers") / "design")
 
 
 def places(value: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:

@@ -410,6 +410,7 @@ def test_markdown_tables_line_up(whole: ReportData) -> None:
             assert len(above) == len(below)
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_bytes(whole: ReportData, html: str, tmp_path: Path) -> None:
     write_report(whole, tmp_path / "report.html", tmp_path / "report.md")
     assert (tmp_path / "report.html").read_bytes() == html.encode("utf-8")

@@ -142,7 +142,6 @@ def test_ngspice_shows_the_model_s_response(case: str, pool: SpicePool) -> None:
     assert check.passed, check.problem
 
 
-@pytest.mark.slow
 def test_a_contact_in_which_ngspice_once_found_no_rest_is_answered(pool: SpicePool) -> None:
     """A beam's tip between two steep stops, in SI units: the integrators' loop as a whole left
     ngspice without an operating point in the upper contact."""

@@ -463,6 +463,7 @@ def amplitudes(name: str, omega: float) -> Array:
     return np.array(made(name).design.excitation(1.0, omega).amplitudes)
 
 
+@pytest.mark.slow
 def test_the_ground_s_channel_follows_the_frequency() -> None:
     ratios = amplitudes("force beside base", 2.0) / amplitudes("force beside base", 1.0)
     assert ratios == pytest.approx([1.0, 4.0])
