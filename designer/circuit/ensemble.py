@@ -139,7 +139,7 @@ class Ensemble:
         """``settle`` as far as the compiled way goes: None where it leaves a question open.
 
         For predictions: what has no period after 140 drive periods (``QUICK`` stages), or clips,
-        stays open. A drive that is no sine has no compiled way: it is settled briefly.
+        stays open. Under a drive that is no sine a board is settled briefly.
         """
 
         def brief(board: int, drive: Drive, start: Array) -> SettledBoard | None:
@@ -276,7 +276,7 @@ class Ensemble:
             system, start = reduction.system(), reduction.state(start)
             if self._modes is not None and not (system.built or drive.is_sine):
                 system.know(self._modes.alone(board, self._second_channel))
-            flow = Flow(system, drive, fast=self._fast)
+            flow = Flow(system, drive, fast=self._fast, waves=True)
             if within is None:
                 orbit = attractors.settle(flow, start)
             else:

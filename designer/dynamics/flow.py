@@ -5,7 +5,8 @@ step is a matrix exponential; boundaries are found to rounding error and grazing
 absent or found (see ``kernels.kernel_general``). Four states with one stop pair take the modal
 fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
 every other system of few states, and a circuit that keeps to its working modes, takes that of
-``kernels.kernel_propagators``; the waves of a drive that is no sine are states of it there.
+``kernels.kernel_propagators``. A drive with harmonics is the general kernel's alone, unless its
+waves are asked to be states of that path.
 """
 
 from __future__ import annotations
@@ -53,14 +54,23 @@ FAST_STEP, FAST_PERIOD, FAST_IMPACT = 0.15, 10.0, 10.0
 class Flow:
     """The flow of one system under one drive; keeps the tables of the modes it has met.
 
-    fast : take the modal fast path where it fits; False: always the general kernel.
+    fast : take a fast path where one fits; False: always the general kernel. waves : the tabulated
+    one too under a drive with further waves, which are states then. It is compiled for each number
+    of states, which takes longer than most models run for.
 
     Raises
     ------
     ValueError : other waves than the drive's for a drive that is no sine itself.
     """
 
-    def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
+    def __init__(
+        self,
+        system: PiecewiseLinearSystem,
+        drive: Drive,
+        *,
+        fast: bool = True,
+        waves: bool = False,
+    ) -> None:
         if system.orders is not None and not drive.is_sine:
             raise ValueError("waves beside a drive that is no sine")
         if system.mirror is not None and any(order % 2 == 0 for order in drive.orders):
@@ -69,16 +79,17 @@ class Flow:
         self.system = system
         self.drive = drive
         self.orders = system.orders or drive.orders
-        is_sine = drive.is_sine and not self.orders
-        modal = fast and is_sine and not system.working
-        self._modal = modal_tables.tables(system, drive) if modal else None
-        self._waves = () if is_sine else (1, *self.orders)
-        alone, rest = system, drive
-        if self._waves:
-            alone = with_drive_states(system, drive)
+        self._waves: tuple[int, ...] = ()
+        self._modal: ModalTables | None = None
+        self._tabulated: TabulatedModes | None = None
+        if fast and drive.is_sine and not self.orders:
+            self._modal = None if system.working else modal_tables.tables(system, drive)
+            if self._modal is None and system.size <= MOST_STATES:
+                self._tabulated = TabulatedModes(system, drive)
+        elif fast and waves and system.size + 2 * len(self.orders) + 2 <= MOST_STATES:
+            self._waves = (1, *self.orders)
             rest = replace(drive, amplitude=0.0, shape=SINE, second=None)
-        tabulated = fast and self._modal is None and alone.size <= MOST_STATES
-        self._tabulated = TabulatedModes(alone, rest) if tabulated else None
+            self._tabulated = TabulatedModes(with_drive_states(system, drive), rest)
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         rows = zip(system.displacement, system.state_in, strict=True)
@@ -167,7 +178,7 @@ class Flow:
                 stretches,
                 points,
                 key,
-                phi.copy(),
+                phi,
                 max_events,
                 room,
                 measure=measure,

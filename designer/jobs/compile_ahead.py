@@ -60,8 +60,7 @@ def compiling_ahead(jobs: int, system: SecondOrderSystem) -> Iterator[Callable[[
         process.wait()
 
     try:
-        flow = Flow(system.piecewise_linear(1.0), Drive(1.0))
-        if flow.kernel == "tabulated" and not flow.orders:  # further waves are further states
+        if Flow(system.piecewise_linear(1.0), Drive(1.0)).kernel == "tabulated":
             doing("compiling the exact engine's part for motion between the stops")
             assert process.stdout is not None
             process.stdout.readline()

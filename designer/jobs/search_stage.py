@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 CANDIDATES = "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
-RULES = 6
+RULES = 7
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 

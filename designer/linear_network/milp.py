@@ -29,7 +29,8 @@ NODES = 3000
 answers do not depend on time."""
 PRICE_WEIGHT = 1e-3
 """Of one price class against one distinct value: price only breaks ties."""
-STATISTICS = "scipy.stats"
+STATISTICS, COMMAND_LINE = "scipy.stats", "designer.cli.entry"
+"""Modules."""
 
 
 class _Deferred(ModuleType):
@@ -56,14 +57,23 @@ class _Deferred(ModuleType):
 
 
 def import_cvxpy() -> None:
-    """Import cvxpy without SciPy's statistics, which take four times as long as all else of it:
-    one of its atoms calls one function of theirs."""
-    known = sys.modules.setdefault(STATISTICS, _Deferred(STATISTICS))
-    try:
-        import_module("cvxpy")
-    finally:
-        if isinstance(known, _Deferred):
-            del sys.modules[STATISTICS]
+    """Import cvxpy without SciPy's statistics, which take four times as long as all else of it: one
+    of its atoms calls one function of theirs.
+
+    They are imported in a process that is not the command line's own, whose other threads might ask
+    for them meanwhile, and where a version of cvxpy needs more of them.
+    """
+    if STATISTICS not in sys.modules and COMMAND_LINE in sys.modules:
+        stand_in = sys.modules[STATISTICS] = _Deferred(STATISTICS)
+        try:
+            import_module("cvxpy")
+        except Exception:  # whatever it made of the stand-in
+            for name in [name for name in sys.modules if name.partition(".")[0] == "cvxpy"]:
+                del sys.modules[name]
+        finally:
+            if sys.modules.get(STATISTICS) is stand_in:
+                del sys.modules[STATISTICS]
+    import_module("cvxpy")
 
 
 def chosen_row(choice: cp.Variable) -> int | None:

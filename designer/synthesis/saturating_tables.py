@@ -54,7 +54,7 @@ TABLES = (
 )
 """Parts of each table."""
 Dividers = dict[tuple[bytes, ...], ValueTable]
-"""Tables of R204, R205 and R208 by whether noise counts, and the values of each."""
+"""The last table of R204, R205 and R208, by whether noise counts and the values of each."""
 
 
 def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, float]:
@@ -315,6 +315,7 @@ def _divider(
     names = "R204", "R205", "R208"
     key = (repr(noisy).encode(), *(lists[name].tobytes() for name in names))
     if key not in known:
+        known.clear()  # one is large
         every = combinations(names, lists, equal.group)
         light = source_resistance(every.columns) if noisy else None
         known[key] = fewest_of_each(every, np.log(divider(every.columns)), free, light)

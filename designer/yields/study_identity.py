@@ -31,6 +31,11 @@ the layer, so that rows of the old rules are not taken for rows of the new ones.
 attribution and with the equation check and the gate."""
 
 
+WAVES = 1
+"""Likewise of samples under a drive that is no sine: by which kernel, and so within how many drive
+periods, they settle."""
+
+
 def study_hash(
     plan: StudyPlan, layer: str = "samples", more: Mapping[str, Any] | None = None
 ) -> str:
@@ -107,6 +112,7 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         "figures": repr(circuit.figures),
         "spread": plain(plan.spread.as_dict()),
         **({"bandwidth": True} if plan.bandwidth else {}),
+        **({} if all(q.excitation.drive.is_sine for q in plan.questions) else {"waves": WAVES}),
         "seed": plan.seed,
         "questions": [
             {

@@ -50,13 +50,14 @@ def test_a_wrong_answer_is_said(monkeypatch: pytest.MonkeyPatch, wrong: float | 
     assert "highspy>=1.15" in words
 
 
-def test_cvxpy_comes_without_statistics() -> None:
+def test_the_command_line_s_cvxpy_comes_without_statistics() -> None:
     """Of SciPy's, which come once the atom that needs them has a value: relative entropy of two
     matrices with the same eigenvectors is that of their eigenvalues."""
     script = textwrap.dedent(
         """
         import sys
         import numpy as np
+        import designer.cli.entry
         from designer.linear_network.milp import import_cvxpy
 
         import_cvxpy()
