@@ -268,7 +268,7 @@ def tables(
     """The tables of these lists. Of rows with the same logarithm, that with the fewest values that
     are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``.
 
-    dividers : those of the same groups and free values; what is missing is added.
+    dividers : the last one of the same groups and free values; another takes its place.
     """
     noisy = bool(np.isfinite(box.noise_gain))
     right = combinations(("R210", "R50"), lists, equal.group)
