@@ -421,13 +421,13 @@ def check(
 def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject]:
     """The subjects with the periods that each has to discard at its fidelity, from a short run."""
     out = list(subjects)
-    indices = [i for i, s in enumerate(subjects) if s.fidelity != "ideal" and s.orbit.n]
+    indices = [i for i, s in enumerate(subjects) if s.fidelity != "ideal" and s.laps]
     tasks = []
     for i in indices:
         s = subjects[i]
         contact = shortest_contact(s.orbit, s.system, s.excitation)
         steps = 2 * first_steps(s, contact)
-        probe = replace(s, discard=max(PROBE - 4, 0) * s.orbit.n)
+        probe = replace(s, discard=max(PROBE - 4, 0) * s.laps)
         tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
     for k, outcome in remedies.run(pool, tasks):
         s = subjects[indices[k]]
