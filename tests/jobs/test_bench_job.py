@@ -96,7 +96,7 @@ def test_a_stop_that_the_motion_does_not_reach_is_named_so(folder: Path, tmp_pat
     np.savetxt(path, table, delimiter=",", header="Time(s),CH1(V),CH2(V)", comments="")
     told = {"v1": "CH1", "fv": "CH2"}
     result = bench(folder, [path], omega=0.85, channels=told, out=out, ngspice=False)
-    check_type(result.answer)
+    check_type(result.answer, "bench")
     (record,) = json.loads((out / "bench.json").read_text("utf-8"))["records"]
     (stop,) = record["stops"]
     assert record["response"] == "1-1-0"
@@ -135,7 +135,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     for net in ("v1", "fv"):
         assert wave[net] == pytest.approx(exact[net], abs=0.02)
     assert result.answer["records"] == [record]
-    check_type(result.answer)
+    check_type(result.answer, "bench")
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
@@ -167,7 +167,7 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
         files.append(csv_of(number, tmp_path / name / "v1.csv"))
     out = tmp_path / "out"
     result = bench(folder, files, boards=True, out=out)
-    check_type(result.answer)
+    check_type(result.answer, "bench")
     first, second = result.answer["boards"]
     assert (first["board"], second["board"]) == ("A", "B")
     assert not first["doubtful"]
