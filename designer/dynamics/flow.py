@@ -51,7 +51,8 @@ FAST_STEP, FAST_PERIOD, FAST_IMPACT = 0.15, 10.0, 10.0
 
 
 class Flow:
-    """The flow of one system under one drive; keeps the tables of the modes it has met.
+    """The flow of one system under one drive; keeps the tables of the modes it has met. It is for
+    one thread at a time.
 
     fast : take the modal fast path where it fits; False: always the general kernel.
 
