@@ -21,10 +21,13 @@ class CutRow(TypedDict):
 
 
 class StopEnd(TypedDict):
-    """Where a board's stop begins [V], and the standard error."""
+    """Where a board's stop begins [V], and the standard error.
+
+    error : None of a stop that the motion does not reach: the volts are then the nominal board's.
+    """
 
     volts: float
-    error: float
+    error: float | None
 
 
 class StopRow(TypedDict):

@@ -65,13 +65,12 @@ class BasePerVolt(TypedDict, total=False):
 
 
 class SpringMisfit(TypedDict):
+    """A cubic spring whose force is off where a motion draws it."""
+
     between: Sequence[str]
     range: float
     reached: float
     error: float
-
-
-"""A cubic spring whose force is off where a motion draws it."""
 
 
 class StopMisfit(TypedDict):

@@ -313,7 +313,7 @@ class StudyMapRow(TypedDict):
     samples: int
     seed: int
     used: float
-    frequency_hz: float
+    frequency_hz: float | None
     window: Sequence[float] | None
     open: Sequence[bool]
     recommended: Sequence[float] | None

@@ -1,8 +1,8 @@
 """Flows that differ in one or two parameters: what a branch or a border is followed over.
 
 A model's family runs over one of its dimensionless parameters or over ω, a board's over one of the
-generator's settings; a plane over two of them. Each value has a flow of its own; the last few are
-kept.
+generator's settings; a plane over two of them. Each value has a flow of its own; each thread keeps
+its last few.
 """
 
 from __future__ import annotations
@@ -10,18 +10,33 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from designer.base.errors import InputError
 from designer.dynamics.flow import Flow
 
 Key = TypeVar("Key")
-_keeping = threading.Lock()
 MOST_FLOWS = 8
-"""Flows that a family remembers."""
+"""Flows that a family remembers, in each thread."""
 ASIDE = 1e-3
 """Of a value, or of its domain where that is narrower: how far aside it is looked whether a mirror
 is that of all values."""
+
+
+class _Kept(threading.local, Generic[Key]):
+    """The last few flows of each thread: a flow is used by one thread at a time."""
+
+    def __init__(self) -> None:
+        self.flows: dict[Key, Flow] = {}
+
+    def flow(self, key: Key, build: Callable[[], Flow]) -> Flow:
+        """The flow of this key; one that is made takes the place of the oldest."""
+        if key not in self.flows:
+            made = build()
+            while len(self.flows) >= MOST_FLOWS:
+                self.flows.pop(next(iter(self.flows)))
+            self.flows[key] = made
+        return self.flows[key]
 
 
 @dataclass(frozen=True)
@@ -35,7 +50,7 @@ class Family:
     """Upper end of the parameter's domain."""
     build: Callable[[float], Flow]
     """Makes the flow at a value."""
-    _flows: dict[float, Flow] = field(default_factory=dict, repr=False, compare=False)
+    _kept: _Kept[float] = field(default_factory=_Kept, repr=False, compare=False)
 
     def flow(self, value: float) -> Flow:
         """The flow at a value of the parameter.
@@ -44,11 +59,12 @@ class Family:
         ------
         InputError : the value lies outside the domain, or nothing can have it.
         """
-        flow = self._flows.get(value)
-        if flow is not None:
-            return flow
-        self.check(value)
-        return _remembered(self._flows, value, self.build(value))
+
+        def made() -> Flow:
+            self.check(value)
+            return self.build(value)
+
+        return self._kept.flow(value, made)
 
     def contains(self, value: float) -> bool:
         """Whether there is a flow at the value: others may keep the parameter from it that its own
@@ -87,7 +103,7 @@ class FlowPlane:
     """Name and domain of the second parameter; its flows are at the first's nominal value."""
     build: Callable[[float, float], Flow]
     """Makes the flow at a pair of values, the first parameter's before the second's."""
-    _flows: dict[tuple[float, float], Flow] = field(default_factory=dict, repr=False, compare=False)
+    _kept: _Kept[tuple[float, float]] = field(default_factory=_Kept, repr=False, compare=False)
 
     @property
     def parameters(self) -> tuple[str, str]:
@@ -101,12 +117,13 @@ class FlowPlane:
         ------
         InputError : a value lies outside its domain, or nothing can have both.
         """
-        flow = self._flows.get((first, second))
-        if flow is not None:
-            return flow
-        self.first.check(first)
-        self.second.check(second)
-        return _remembered(self._flows, (first, second), self.build(first, second))
+
+        def made() -> Flow:
+            self.first.check(first)
+            self.second.check(second)
+            return self.build(first, second)
+
+        return self._kept.flow((first, second), made)
 
     def contains(self, first: float, second: float) -> bool:
         """Whether there is a flow at both values: one may keep the other from it."""
@@ -127,12 +144,3 @@ class FlowPlane:
         """The family over the first parameter, at a value of the second."""
         one = self.first
         return Family(one.parameter, one.low, one.high, lambda v: self.build(v, second))
-
-
-def _remembered(flows: dict[Key, Flow], key: Key, flow: Flow) -> Flow:
-    """The flow, kept in the place of the oldest: of several threads one at a time, since two that
-    drop the same one do not both find it."""
-    with _keeping:
-        while len(flows) >= MOST_FLOWS:
-            flows.pop(next(iter(flows)))
-        return flows.setdefault(key, flow)

@@ -52,7 +52,8 @@ FAST_STEP, FAST_PERIOD, FAST_IMPACT = 0.15, 10.0, 10.0
 
 
 class Flow:
-    """The flow of one system under one drive; keeps the tables of the modes it has met.
+    """The flow of one system under one drive; keeps the tables of the modes it has met. It is for
+    one thread at a time.
 
     fast : take a fast path where one fits; False: always the general kernel. waves : the tabulated
     one too under a drive with further waves, which are states then. It is compiled for each number

@@ -82,9 +82,11 @@ def _read(study: StudyAnswer, modelfile: ModelFile) -> FolderLosses | None:
     if not asked:
         return None
     origin, own = study["provenance"], modelfile.model.b
+    if origin["spread"] is None:
+        raise ValueError("a study without the spread of its boards")
     words = (
         "Estimated by tolerance --rare for the parts of this folder, boards "
-        f"{boards_at((origin['spread'] or {})['temperature'])}, seed {origin['seed']}."
+        f"{boards_at(origin['spread']['temperature'])}, seed {origin['seed']}."
     )
     if any_lost := study.get("any_lost"):
         words += f" {any_lost_words(any_lost)}."

@@ -214,7 +214,7 @@ def _coexisting(simulated: Simulated, number: int, si: SiScales | None) -> Coexi
         row["in_clearances"] = _in_clearances(simulated, orbit, beside)
     row = {**row, **misfits_json(simulated.misfits[number] if simulated.misfits else ())}
     held = simulated.sticking[number] if simulated.sticking else ()
-    if held != ():
+    if held is None or held:
         row["sticking"] = plain(held)
     # What else the twin is follows by the mirror.
     mirrored: TwinRow | None = (

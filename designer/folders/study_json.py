@@ -21,7 +21,6 @@ from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
 from designer.yields.yield_count import Yield, count, count_verdicts, reasons
-from designer.yields.yield_maps import YieldMap
 
 if TYPE_CHECKING:
     from designer.answers.shared_rows import ProvenanceRow
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
         ResponseExtras,
         StudyAnswer,
         StudyCost,
-        StudyMapRow,
         StudyResponse,
         TrimmedRow,
         TunedRow,
@@ -80,7 +78,7 @@ def study_json(
             {**_response(c, study, i), **hertz_json(c.model.omega, si)}
             for i, c in enumerate(study.checked)
         ],
-        "maps": [_map(each) for each in study.maps],
+        "maps": [each.as_dict() for each in study.maps],
         "provenance": provenance,
         "cost": cast("StudyCost", dict(cost)),
     }
@@ -194,12 +192,6 @@ def _rare(study: Study, index: int) -> RareLossKeys | None:
     """Without what it cost, which stands with the other costs."""
     found = study.rare_of(index)
     return None if found is None else _without(found.as_dict(), "question", "seconds")
-
-
-def _map(yields: YieldMap) -> StudyMapRow:
-    """Without what it cost, which stands with the other costs."""
-    row: StudyMapRow = _without(yields.as_dict(), "cost")
-    return row
 
 
 def _without(row: Mapping[str, Any], *keys: str) -> Any:

@@ -31,7 +31,7 @@ from designer.workbench.record import RecordedMotion
 from designer.workbench.record_formats import read_record
 
 if TYPE_CHECKING:
-    from designer.answers.bench_answer import BenchJson, CutRow, RecordRow, StopRow
+    from designer.answers.bench_answer import BenchJson, CutRow, RecordRow, StopEnd, StopRow
     from designer.workbench.dead_zone_curve import DeadZoneCurve
 
 PAGE, LIST = "bench.html", "boards.csv"
@@ -277,10 +277,15 @@ def record_json(benched: BenchedRecord, seconds: float, si: SiScales | None) -> 
 def _stops(clearance: str, zone: DeadZoneCurve) -> StopRow:
     row: StopRow = {"clearance": clearance}
     if 1 in zone.ends:
-        row["upper"] = {"volts": zone.ends[1], "error": zone.end_errors[1]}
+        row["upper"] = _stop_end(zone, 1)
     if -1 in zone.ends:
-        row["lower"] = {"volts": zone.ends[-1], "error": zone.end_errors[-1]}
+        row["lower"] = _stop_end(zone, -1)
     return row
+
+
+def _stop_end(zone: DeadZoneCurve, side: int) -> StopEnd:
+    error = zone.end_errors[side]
+    return {"volts": zone.ends[side], "error": error if math.isfinite(error) else None}
 
 
 def _cut_json(net: str, channel: str, low: float | None, high: float | None) -> CutRow:

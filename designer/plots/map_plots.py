@@ -45,7 +45,8 @@ def map_files(
     for one in maps:
         label, name = labels[one.question], f"map-{one.over}-{one.question + 1}.png"
         pictures[name] = to_png(map_chart(" ".join(label.split()), one, angular=angular))
-        rows.append({"response": label, "picture": name, **one.as_dict()})
+        cost = {"attractors": one.attractors, "seconds": one.seconds}
+        rows.append({"response": label, "picture": name, **one.as_dict(), "cost": cost})
     document = {"format": FORMAT, **provenance, "maps": rows}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     return {"maps.json": f"{text}\n".encode(), **pictures}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         NgspiceOverlay,
         RecordKeys,
         RecordRow,
+        StopEnd,
     )
 
 YES_NO = {True: "yes", False: "no", None: ""}
@@ -159,6 +160,13 @@ def drive_words(record: RecordRow) -> str:
     return hertz if volts is None else f"{hertz}, {volts:.3g} V peak"
 
 
+def _end_words(end: StopEnd) -> str:
+    """Where a stop begins, within two standard errors."""
+    if end["error"] is None:
+        return "not reached"
+    return f"{format_quantity(end['volts'], 'V')} ± {format_quantity(2.0 * end['error'], 'V')}"
+
+
 def _blocks(record: RecordRow, drawing: Markup) -> Iterator[str | Picture | SmallPrint]:
     channels = ", ".join(f"{net} at {channel}" for net, channel in record["channels"].items())
     yield (
@@ -171,8 +179,7 @@ def _blocks(record: RecordRow, drawing: Markup) -> Iterator[str | Picture | Smal
         yield f"Why it is not sure: {record['reason']}. What would tell: {record['would_tell']}."
     for stop in record["stops"]:
         ends = [
-            f"{side} {format_quantity(end['volts'], 'V')} "
-            f"± {format_quantity(2.0 * end['error'], 'V')}"
+            f"{side} {_end_words(end)}"
             for side, end in (("upper", stop.get("upper")), ("lower", stop.get("lower")))
             if end is not None
         ]

@@ -13,7 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.spread import OpAmpDrift, Spread, draw_many
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.yield_count import Yield
+
+if TYPE_CHECKING:
+    from designer.answers.study_answer import StudyMapRow
 
 Counts = NDArray[np.int64]
 
@@ -162,14 +165,19 @@ class YieldMap:
         nearest = longest[int(np.argmin(np.abs(values[longest] - middle)))]
         return (float(values[nearest]), *grade)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        arrays = ("there", *_COUNTS, "low", "high")
-        return {
+    def as_dict(self) -> StudyMapRow:
+        """Plain, for JSON, without what it cost."""
+        row: StudyMapRow = {
             "over": self.over,
             "question": self.question,
             "axes": [{"name": a.name, "values": list(a.values)} for a in self.axes],
-            **{name: getattr(self, name).tolist() for name in arrays},
+            "there": self.there.tolist(),
+            "ok": self.ok.tolist(),
+            "lost": self.lost.tolist(),
+            "grazing": self.grazing.tolist(),
+            "failed": self.failed.tolist(),
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
             "samples": self.samples,
             "seed": self.seed,
             "used": self.used,
@@ -177,18 +185,16 @@ class YieldMap:
             "window": None if self.window is None else list(self.window),
             "open": list(self.open),
             "recommended": None if self.recommended is None else list(self.recommended),
-            **({} if self.drift is None else self._temperature()),
-            "cost": {"attractors": self.attractors, "seconds": self.seconds},
         }
+        if self.drift is not None:
+            row["op_amps"] = self.drift.as_dict()
+            row["specified"] = list(self.specified)
+        return row
 
     def outside(self, celsius: float) -> bool:
         """Whether the op-amp is not specified for a temperature [°C]."""
         low, high = self.specified
         return (low is not None and celsius < low) or (high is not None and celsius > high)
-
-    def _temperature(self) -> dict[str, Any]:
-        assert self.drift is not None
-        return {"op_amps": self.drift.as_dict(), "specified": list(self.specified)}
 
     def _each(self, value: Callable[[Yield], float]) -> Array:
         out = np.zeros(self.there.shape)

@@ -20,7 +20,9 @@ from designer.answers.search_answer import ConfirmationFile, ConfirmationRow, Se
 from designer.answers.simulate_answer import SimulateAnswer
 from designer.answers.study_answer import StudyAnswer
 from designer.answers.trade_answer import TradeAnswer
-from tests.shared.typed_answers import assert_type, check_type, declared
+from designer.cli import entry
+from designer.cli.app import VERBS as VERBS_OF_TOOL
+from tests.shared.typed_answers import OF_VERB, assert_type, check_type, declared
 
 ROOT = Path(__file__).resolve().parents[2]
 JSON = (ROOT / "docs" / "contract.md").read_text("utf-8").split("\n## JSON\n")[1].split("\n## ")[0]
@@ -122,7 +124,27 @@ def test_folders_of_reports_are_of_the_types(path: Path) -> None:
     assert_type(json.loads(path.read_text("ascii")), FILES[path.name])
 
 
-def test_another_key_is_seen() -> None:
-    wrong = {"engine": "model", "responses": [{"omga": 0.85}]}
-    with pytest.raises(AssertionError, match=r"responses\.0\.omga"):
-        check_type(wrong)
+@pytest.mark.parametrize(
+    ("verb", "wrong", "where"),
+    [
+        ("simulate", {"engine": "model", "responses": [{"omga": 0.85}]}, r"responses\.0\.omga"),
+        ("simulate", {"engin": "model", "responses": []}, r"\.engin\n"),
+        ("bifurcation", {"kind": "sweep", "windws": [], "tracks": []}, r"\.windws\n"),
+        ("export", {"format": 1, "files": "a", "provenance": {}}, r"\.files\n"),
+    ],
+)
+def test_another_key_is_seen(verb: str, wrong: Any, where: str) -> None:
+    with pytest.raises(AssertionError, match=where):
+        check_type(wrong, verb)
+
+
+def test_what_a_verb_prints_is_looked_at(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(OF_VERB, "catalog", RulesJson)
+    assert entry.status(["catalog", "--json"]) != 0
+    assert "RulesJson" in capsys.readouterr().err
+
+
+def test_every_verb_has_a_type_or_is_known_to_have_none() -> None:
+    assert OF_VERB.keys() == set(VERBS_OF_TOOL) - {"reproduce", "explore"}

@@ -4,10 +4,9 @@ independent integrator."""
 from __future__ import annotations
 
 import threading
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,24 +106,38 @@ def test_torus_curve_and_its_resonances_where_damping_vanishes() -> None:
     assert met == pytest.approx({"1:3 resonance": 3.0, "1:4 resonance": 4.0}, abs=1e-8)
 
 
-def test_two_threads_do_not_drop_the_same_flow() -> None:
-    """The rays of a region ask at once; here both threads are about to drop the oldest flow."""
+def test_each_thread_has_flows_of_its_own() -> None:
+    """The rays of a region ask at once; a flow is used by one thread at a time."""
     both = threading.Barrier(2)
 
-    class Meeting(dict[Any, Any]):
-        def pop(self, *key: Any) -> Any:
-            with suppress(threading.BrokenBarrierError):
-                both.wait(0.5)
-            return super().pop(*key)
-
-    def build(*at: float) -> Any:
-        return at
+    def build(*_: float) -> Any:
+        return object()
 
     along = Family("a", 0.0, 1e9, build)
-    known = Meeting({(0.0, float(k)): () for k in range(MOST_FLOWS)})
-    plane = FlowPlane(along, along, build, known)
-    places = [(1.0, 0.0), (2.0, 0.0)]
-    assert list(parallel(lambda at: cast(Any, plane.flow(*at)), places, 2)) == places
+    plane = FlowPlane(along, along, build)
+
+    def asked(_: int) -> tuple[Flow, Flow]:
+        both.wait(60.0)
+        flows = plane.flow(1.0, 0.0), along.flow(1.0)
+        assert (plane.flow(1.0, 0.0), along.flow(1.0)) == flows
+        return flows
+
+    (at, over), (at_other, over_other) = parallel(asked, range(2), 2)
+    assert at is not at_other
+    assert over is not over_other
+
+
+def test_the_oldest_flow_is_dropped() -> None:
+    made: list[float] = []
+
+    def build(value: float) -> Any:
+        made.append(value)
+        return object()
+
+    along = Family("a", 0.0, 1e9, build)
+    for value in (*range(MOST_FLOWS + 1), 1, 0):
+        along.flow(float(value))
+    assert made == [*range(MOST_FLOWS + 1), 0]
 
 
 @pytest.mark.parametrize("kind", [PointKind.FOLD, PointKind.TORUS, PointKind.GRAZING])

@@ -86,6 +86,25 @@ def test_the_verb_prints_the_object(
     assert "--record is missing" in capsys.readouterr().err
 
 
+def test_a_stop_that_the_motion_does_not_reach_is_named_so(folder: Path, tmp_path: Path) -> None:
+    """A sine into a stage that bends at 4.7 V; the lower stop is 3 V beyond the motion."""
+    time = np.linspace(0.0, 9.0 / stored(2).frequency, 4000)
+    v1 = 2.0 + 3.6 * np.sin(2.0 * np.pi * stored(2).frequency * time)
+    noise = np.random.default_rng(2).normal(0.0, 0.01, (4000, 2))
+    table = np.column_stack([time, v1 + noise[:, 0], np.maximum(v1 - 4.7, 0.0) + noise[:, 1]])
+    path, out = tmp_path / "one.csv", tmp_path / "board"
+    np.savetxt(path, table, delimiter=",", header="Time(s),CH1(V),CH2(V)", comments="")
+    told = {"v1": "CH1", "fv": "CH2"}
+    result = bench(folder, [path], omega=0.85, channels=told, out=out, ngspice=False)
+    check_type(result.answer, "bench")
+    (record,) = json.loads((out / "bench.json").read_text("utf-8"))["records"]
+    (stop,) = record["stops"]
+    assert record["response"] == "1-1-0"
+    assert stop["upper"]["volts"] == pytest.approx(4.7, abs=4.0 * stop["upper"]["error"])
+    assert stop["lower"]["error"] is None
+    assert ", lower not reached." in (out / "bench.html").read_text("utf-8")
+
+
 def test_tables_are_the_answer(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -116,7 +135,7 @@ def test_ngspice_is_laid_over_a_record(folder: Path, tmp_path: Path) -> None:
     for net in ("v1", "fv"):
         assert wave[net] == pytest.approx(exact[net], abs=0.02)
     assert result.answer["records"] == [record]
-    check_type(result.answer)
+    check_type(result.answer, "bench")
     assert "Dotted: ngspice" in (out / "bench.html").read_text("utf-8")
 
 
@@ -148,7 +167,7 @@ def test_boards_are_fitted_and_advised(folder: Path, tmp_path: Path) -> None:
         files.append(csv_of(number, tmp_path / name / "v1.csv"))
     out = tmp_path / "out"
     result = bench(folder, files, boards=True, out=out)
-    check_type(result.answer)
+    check_type(result.answer, "bench")
     first, second = result.answer["boards"]
     assert (first["board"], second["board"]) == ("A", "B")
     assert not first["doubtful"]

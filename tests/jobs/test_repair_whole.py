@@ -70,7 +70,7 @@ def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     synthesise_into(parse_model_file(model), design, Options(), Progress())
     found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
-    check_type(found.answer)
+    check_type(found.answer, "search")
     return Whole(design, repaired, found.answer)
 
 

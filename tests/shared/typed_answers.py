@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, NotRequired, get_args, get_origin
@@ -12,55 +12,57 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import get_type_hints, is_typeddict
 
 from designer.answers.bench_answer import BenchJson
-from designer.answers.bifurcation_answer import BasinsAnswer, MapAnswer, SweepAnswer
+from designer.answers.bifurcation_answer import BifurcationAnswer
 from designer.answers.cure_answer import CureAnswer
 from designer.answers.design_answer import DesignAnswer
+from designer.answers.export_answer import ExportJson
 from designer.answers.rules_answer import RulesJson
 from designer.answers.search_answer import SearchAnswer
 from designer.answers.simulate_answer import SimulateAnswer
 from designer.answers.study_answer import RunAnswer, StudyAnswer
 from designer.answers.trade_answer import TradeAnswer
 from designer.base.plain_json import plain
-from designer.cli import app
+from designer.cli import app, command_line
 
-TYPES: Mapping[type, frozenset[str]] = {
-    SimulateAnswer: frozenset({"engine"}),
-    SweepAnswer: frozenset({"windows", "tracks"}),
-    MapAnswer: frozenset({"counts", "x"}),
-    BasinsAnswer: frozenset({"cells"}),
-    SearchAnswer: frozenset({"search", "confirmation", "parts"}),
-    RunAnswer: frozenset({"parts", "samples"}),
-    DesignAnswer: frozenset({"parts", "knobs"}),
-    StudyAnswer: frozenset({"samples", "narrow"}),
-    CureAnswer: frozenset({"upgrades", "front"}),
-    TradeAnswer: frozenset({"rungs"}),
-    RulesJson: frozenset({"rules", "counts"}),
-    BenchJson: frozenset({"records"}),
+OF_VERB: dict[str, Any] = {
+    "simulate": SimulateAnswer,
+    "bifurcation": BifurcationAnswer,
+    "search": SearchAnswer | CureAnswer,
+    "run": RunAnswer,
+    "synthesise": DesignAnswer,
+    "synthesize": DesignAnswer,
+    "tolerance": StudyAnswer,
+    "trade": TradeAnswer,
+    "rules": RulesJson,
+    "bench": BenchJson,
+    "export": ExportJson,
+    "catalog": object,
+    "new": object,
 }
-"""The first whose keys an object has is its type."""
+"""The type of what each verb prints; ``object``: it has none."""
+NOT_FOUND = {"responses"}
+"""Keys of what any verb prints where the model does not show a response."""
 
 
-def check_type(answer: object) -> None:
-    """Raises AssertionError where an object that has a type is not of it: a key that it does not
+def check_type(answer: object, verb: str) -> None:
+    """Raises AssertionError where what a verb prints is not of its type: a key that this does not
     declare, one that is missing, a value of another type."""
     value = plain(answer)
-    kinds = (kind for kind, keys in TYPES.items() if value.keys() >= keys)
-    kind = next(kinds, None)
-    if kind is not None:
-        assert_type(value, kind)
+    if value.keys() != NOT_FOUND:
+        assert_type(value, OF_VERB[verb])
 
 
-def assert_type(value: object, kind: type) -> None:
-    """Raises AssertionError where a value is not of a type of ``answers``."""
+def assert_type(value: object, kind: Any) -> None:
+    """Raises AssertionError where a value is not of a type, or of a union of types."""
     try:
         _reader(kind).validate_python([value], strict=True)
     except ValidationError as error:
-        raise AssertionError(f"{kind.__name__}: {error}") from error
+        raise AssertionError(str(error)) from error
 
 
 @cache
-def _reader(kind: type) -> TypeAdapter[Any]:
-    return TypeAdapter(list[kind], config=ConfigDict(extra="forbid"))  # type: ignore[valid-type]
+def _reader(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(list[kind], config=ConfigDict(extra="forbid"))
 
 
 def declared(kind: Any) -> set[str]:
@@ -101,12 +103,18 @@ def _may_miss(hint: Any) -> bool:
 @contextmanager
 def printed_answers_checked() -> Iterator[None]:
     """Inside, what a verb prints in this process is of its type."""
-    write = app.print_json
+    write, run = app.print_json, command_line.dispatch
+    verbs: list[str] = []
+
+    def dispatch(arguments: list[str]) -> int:
+        verbs[:] = arguments[:1]
+        return run(arguments)
 
     def checked(answer: object) -> None:
-        check_type(answer)
+        check_type(answer, *verbs)
         write(answer)
 
     with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(command_line, "dispatch", dispatch)
         patched.setattr(app, "print_json", checked)
         yield
