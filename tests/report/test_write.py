@@ -588,6 +588,10 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
         boards, agreed, *others = map(int, row[2:7])
         assert (agreed, others) == (boards - 3, [1, 1, 1])
         assert "but 9-9-9 (1), why failed (1), why undecided (1)" in row[7]
+    few = ngspice_table(changed(whole, not_asked=(0, 31, 0)))
+    assert few is not None
+    told = [(row[0], row[1]) for row in few.rows if "not asked (31)" in row[7]]
+    assert told == [(few.rows[2][0], "the nominal orbit")]
 
 
 def test_without_responses(whole: ReportData) -> None:
