@@ -448,15 +448,14 @@ def test_no_time_and_no_path_of_this_machine_stands_in_it(whole: ReportData, htm
     assert str(EXAMPLE.parent) not in html + render_markdown(whole)
 
 
-@pytest.mark.slow
 def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     bom = [{**whole.bom[0], "manufacturer": HOSTILE, "part_number": "x" * 70}]
     modelfile = replace(whole.result.modelfile, title=HOSTILE)
     data = changed(whole, modelfile=modelfile, command=f"run\n{HOSTILE}")
     vars(data)["bom"] = bom
-    plain, hostile = Page(html), Page(render_html(data))
+    plain, hostile = Page(html), words_of(data)
     assert hostile.text.count(HOSTILE) == 5  # title, heading, summary, BOM, command
-    assert {tag for tag, _ in plain.tags} == {tag for tag, _ in hostile.tags}
+    assert {tag for tag, _ in hostile.tags} <= {tag for tag, _ in plain.tags}
     assert "49" not in hostile.text[: hostile.text.index("In short")]
     markdown = render_markdown(data)
     shown = [line for line in markdown.splitlines() if not line.startswith("    ")]
