@@ -132,6 +132,7 @@ class LeftOutBoard(TypedDict):
 class NominalAgreement(AgreementCounts):
     too_long: NotRequired[int]
     left_out: NotRequired[Sequence[LeftOutBoard]]
+    not_asked: NotRequired[int]
 
 
 class AgreementRow(AgreementCounts):

@@ -436,11 +436,12 @@ def _sobol(size: int, count: int, seed: int) -> Array:
     response than SciPy's statistics to import.
     """
     folder = jit.CACHE if seed == 0 else None
-    kept = None if folder is None else folder / f"sobol-{scipy.__version__}-{size}-{count}.npy"
+    made_by = f"{scipy.__version__}-{np.__version__}"  # NumPy draws what scrambles
+    kept = None if folder is None else folder / f"sobol-{made_by}-{size}-{count}.npy"
     if kept is not None:
         with suppress(OSError, ValueError, EOFError):
             known = np.load(kept)
-            if known.shape == (count, size):
+            if _is_sobol(known, size, count):
                 return np.asarray(known)
     from scipy.stats import qmc
 
@@ -449,6 +450,15 @@ def _sobol(size: int, count: int, seed: int) -> Array:
         with suppress(NotWritten), appearing(kept) as partial, partial.open("wb") as file:
             np.save(file, points)
     return points
+
+
+def _is_sobol(points: Array, size: int, count: int) -> bool:
+    """Whether an array has the form of a Sobol set of 2^m points: along each axis one of them in
+    each of so many equal parts of [0, 1)."""
+    if points.dtype != float or points.shape != (count, size):
+        return False
+    parts = np.sort(np.floor(count * points), axis=0)
+    return bool((parts == np.arange(count)[:, None]).all())
 
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:

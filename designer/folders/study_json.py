@@ -110,7 +110,9 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> StudyRespon
         "rate": None if counted is None else counted.rate,
         "reasons": reasons((a.verdict, a.reason) for a in answers),
         "margins": margins(answers),
-        "agreement": _agreement(answers, study.rows_of(index, study.cross_checks)),
+        "agreement": _agreement(
+            answers, study.rows_of(index, study.cross_checks), study.not_asked_of(index)
+        ),
         "combined": _combined(study.combined[index]),
         "tuned": tuned_json(study.rows_of(index, study.tuned), study.plan.census),
         "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
@@ -202,7 +204,9 @@ def _counted(counted: Yield) -> RatedCounts:
     return {**_counts(counted), "rate": counted.rate}
 
 
-def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) -> AgreementRow:
+def _agreement(
+    answers: Sequence[Answer], cross_checks: Sequence[CrossCheck], not_asked: int
+) -> AgreementRow:
     """Boards on which ngspice agrees, by their start: their own orbit, or the nominal one."""
     answer_of = {a.sample: a for a in answers}
 
@@ -224,6 +228,7 @@ def _agreement(answers: Sequence[Answer], cross_checks: Sequence[CrossCheck]) ->
             **of("nominal"),
             "too_long": len(too_long),
             "left_out": [{"sample": h.sample, "reason": h.reason} for h in too_long],
+            "not_asked": not_asked,
         },
     }
 

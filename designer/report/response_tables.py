@@ -180,7 +180,8 @@ def ngspice_table(data: ReportData) -> Table | None:
                 if h.kind is kind and h.response
             ]
             if checks:
-                cells = _ngspice_cells(data.study.answers_to(i), checks)
+                more = data.study.not_asked_of(i) if kind is StartKind.NOMINAL else 0
+                cells = _ngspice_cells(data.study.answers_to(i), checks, more)
                 rows.append((words.name(c), start, *cells))
     columns = (
         "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
@@ -189,7 +190,9 @@ def ngspice_table(data: ReportData) -> Table | None:
     return table(columns, rows, range(2, 7), names=2)
 
 
-def _ngspice_cells(answers: Sequence[Answer], checks: Sequence[CrossCheck]) -> tuple[str, ...]:
+def _ngspice_cells(
+    answers: Sequence[Answer], checks: Sequence[CrossCheck], not_asked: int
+) -> tuple[str, ...]:
     answer_of = {a.sample: a for a in answers}
     notes: dict[NgspiceVerdict, Counter[str]] = {one: Counter() for one in NgspiceVerdict}
     for h in checks:
@@ -202,7 +205,10 @@ def _ngspice_cells(answers: Sequence[Answer], checks: Sequence[CrossCheck]) -> t
     counts = [str(notes[one].total()) for one in NgspiceVerdict]
     del notes[NgspiceVerdict.AGREED]
     ranked = sorted((t, n) for counted in notes.values() for t, n in counted.items())
-    text = ", ".join(f"{t} ({n})" for t, n in ranked[:REASONS_SHOWN])
+    shown = [f"{t} ({n})" for t, n in ranked[:REASONS_SHOWN]]
+    if not_asked:
+        shown.append(f"runs of too many steps together, not asked ({not_asked})")
+    text = ", ".join(shown)
     return (str(len(checks)), *counts, text)
 
 

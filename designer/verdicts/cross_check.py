@@ -222,10 +222,12 @@ def affordable(
     questions: Sequence[Question],
     boards: int = NOMINAL_SAMPLES,
 ) -> list[Ask]:
-    """The first of these asks, by sample, whose runs from the nominal orbit take no more than
-    `STEPS_EACH` steps for each of so many boards of a question, about; all from their own orbit.
+    """The asks that fit a limit of ngspice's steps: of each question together `STEPS_EACH` times
+    ``boards`` from the nominal orbit.
 
-    So slow boards whose ways are long stay a random part of the slow ones.
+    asks : by sample. From a board's own orbit all are kept. From the nominal one none is kept after
+    the first that exceeds the limit, however short its way, or too long to be run: so boards that
+    are asked are a random part of the slow ones, and of the rest.
     """
     mine = {(a.sample, a.question): a for a in answers}
     left = [float(STEPS_EACH * boards)] * len(questions)
@@ -243,6 +245,15 @@ def _steps(answer: Answer, question: Question) -> float:
     counts = read_counts(name_in_ngspice(answer.response))
     way = least_way(0 if counts is None else counts.n, answer.radius)
     return way * question.steps if way <= longest_way(question) else 0.0
+
+
+def not_asked(
+    wanted: Iterable[Ask], asks: Iterable[Ask], questions: Sequence[Question]
+) -> tuple[int, ...]:
+    """How many boards of each question were wanted from the nominal orbit and are not asked."""
+    have = {a.key for a in asks}
+    missing = [a.question for a in wanted if a.key not in have]
+    return tuple(missing.count(k) for k in range(len(questions)))
 
 
 def ask_boundary(

@@ -203,8 +203,8 @@ def _queries(
         halvings = OWN_REFINEMENTS
         if ask.kind is StartKind.NOMINAL:
             flow = Flow(subject.system, subject.excitation.drive)
-            way = periods_to_settle(flow, question.start.start, subject.orbit)
             most = longest_way(question)
+            way = periods_to_settle(flow, question.start.start, subject.orbit, most)
             if way > most:
                 yield ask, _too_long(ask, way, most)
                 continue
@@ -239,28 +239,31 @@ def way_to_fidelity(orbit: Orbit) -> int:
 
 
 def _too_long(ask: Ask, way: float, most: float) -> CrossCheck:
-    needed = f"{way:.0f} drive periods" if math.isfinite(way) else "more than can be said"
-    reason = f"too long a way from the nominal orbit: {needed}, at most {most:.0f} are run"
+    needed = f"{way:.0f}" if math.isfinite(way) else f"more than {most:.0f}"
+    reason = f"too long a way from the nominal orbit: {needed} drive periods, at most {most:.0f} "
+    reason += "are run"
     return _row(ask, NgspiceAnswer("", reason), 0)
 
 
-def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
+def periods_to_settle(
+    flow: Flow, start: Array, orbit: Orbit, most: float = MOST_PERIODS
+) -> int | float:
     """Drive periods from ``start`` (states,) to the attractor ``orbit``.
 
     At least ``least_way``, and until every later strobe of the exact trajectory is
     within `REMAINDER` of a strobe of the orbit; "later" ends when the trajectory has stayed there
-    for that least number again, or for `STRETCH`. More than `MOST_PERIODS`, possibly inf, where the
-    way is longer than that.
+    for that least number again, or for `STRETCH`. More than ``most``, possibly inf, where the way
+    is longer than that.
     """
     least = least_way(orbit.n, orbit.radius)
-    if not 0 < orbit.n <= MAX_PERIOD or least > MOST_PERIODS:
+    if not 0 < orbit.n <= MAX_PERIOD or least > most:
         return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
     x, mode, periods, arrived = start, None, 0, 0
     peak = orbit.coarse_peaks
     stay = max(STRETCH, int(least))
     while periods - arrived < stay:
-        if arrived > MOST_PERIODS:
+        if arrived > most:
             return math.inf
         way = flow.run(x, stay - (periods - arrived), mode=mode)
         if way.status is not FlowStatus.DONE:

@@ -60,6 +60,9 @@ class Study:
     """Rows of the boards as built."""
     cross_checks: tuple[CrossCheck, ...] = ()
     """What ngspice answered about boards of the study."""
+    not_asked: tuple[int, ...] = ()
+    """Boards of each question that a limit of steps leaves out (``cross_check.affordable``); empty
+    without ngspice."""
     until: float | None = None
     """Width of the intervals that was asked for; None for none."""
     narrow: bool | None = None
@@ -151,6 +154,10 @@ class Study:
             else None
             for i in range(len(self.checked))
         )
+
+    def not_asked_of(self, index: int) -> int:
+        """Boards of response number ``index`` that a limit of steps leaves out."""
+        return dict(zip(self.response_indices, self.not_asked, strict=False)).get(index, 0)
 
     def rare_of(self, index: int) -> RareLosses | None:
         """The estimate for response number ``index``, if there is one."""

@@ -486,6 +486,21 @@ class StudyWork:
         questions = study.plan.questions
         return cross_check.affordable(asks, study.answers, questions, nominal)
 
+    def _not_asked(self, study: Study, asks: Sequence[Ask], nominal: int) -> tuple[int, ...]:
+        """How many boards of each question the limit of ngspice's steps leaves out, which a note
+        says."""
+        if self.pool is None:
+            return ()
+        wanted = cross_check.ask_random(study.answers, nominal)
+        counts = cross_check.not_asked(wanted, asks, study.plan.questions)
+        for index, count in zip(study.response_indices, counts, strict=True):
+            if count:
+                self.progress.note(
+                    f"response {index + 1}: {count} boards are not asked in ngspice, whose runs "
+                    f"would take more than {nominal} × {cross_check.STEPS_EACH} steps together"
+                )
+        return counts
+
     def _with_all_checks(self, study: Study, nominal: int) -> Study:
         """The study with ngspice's answers about the boards at a boundary, which are known only
         once there is no more sample, and about those on which the engines differ, once that is
@@ -493,6 +508,7 @@ class StudyWork:
         asks = self._random(study, nominal)
         if self.engine != "ngspice":
             asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
+            study = replace(study, not_asked=self._not_asked(study, asks, nominal))
         study = replace(study, cross_checks=self._checks(study, asks, last=False))
         asks += cross_check.ask_differing(study.answers, study.cross_checks, asks)
         return replace(study, cross_checks=self._checks(study, asks))

@@ -165,10 +165,23 @@ def point_of(found: WindowEnds, end: SweptEnd) -> Bifurcation:
 # ---------------------------------------------------------------------------------------------
 
 
+def test_a_window_ends_between_two_steps_where_its_branch_folds() -> None:
+    """The multiplier there is 1 by a difference of the period
+    (tests/bifurcations/test_branch_points_independently.py has the integrator's)."""
+    values = np.linspace(0.9, 0.93, 7)
+    made = sweep.run(SweepPlan(ModelSubject(PAPER), "omega", values, ("up",), course=QUICK))
+    found = window_ends.find(made)
+    (both,) = [e for w, e in zip(made.windows, found.ends, strict=True) if w.response == "1-2-2"]
+    assert both is not None
+    low, high = both
+    assert (low.kind, low.value) == (End.LIMIT, values[0])
+    assert high.kind == "fold"
+    assert high.value == pytest.approx(0.92006, abs=5e-6)
+
+
 @pytest.mark.slow
 def test_a_response_entered_from_chaos_ends_where_its_branch_folds() -> None:
-    """Twelve steps past the last one that shows 1-2-2; the multiplier there is 1 by a difference of
-    the period (tests/bifurcations/test_branch_points_independently.py has the integrator's)."""
+    """Twelve steps past the last one that shows 1-2-2."""
     values = np.linspace(0.85, 1.0, 151)
     made = sweep.run(SweepPlan(ModelSubject(PAPER), "omega", values, course=QUICK))
     (window,) = [w for w in made.windows if w.response == "1-2-2"]
@@ -277,6 +290,7 @@ BASE_BEAM = system_text(
 lie within one step of a branch that comes from above."""
 
 
+@pytest.mark.slow
 def test_stability_that_is_lost_and_had_again_within_a_step_ends_a_window(tmp_path: Path) -> None:
     made = swept(tmp_path / "beam.toml", BASE_BEAM, 37.0, 45.0, 9, "up")
     found = window_ends.find(made)

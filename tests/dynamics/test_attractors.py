@@ -408,14 +408,25 @@ def test_starts_are_rest_and_then_the_box() -> None:
 def test_kept_starts_are_those_that_scipy_draws(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Drawn and kept, read, drawn again where the file is no table, and where none can be kept."""
-    box = 2.0 * qmc.Sobol(3, seed=0).random(8) - 1.0
+    """Drawn and kept, read, drawn again where the file is no table or one of other numbers, and
+    where none can be kept."""
+    points = qmc.Sobol(3, seed=0).random(8)
+    box = 2.0 * points - 1.0
     monkeypatch.setattr(jit, "CACHE", tmp_path)
-    for content in (None, None, b"", b"no table"):
-        for kept in tmp_path.iterdir() if content is not None else ():
-            kept.write_bytes(content or b"")
+    zeros, holed = np.zeros_like(points), np.where(points > 0.9, np.nan, points)
+    others = zeros, holed, 2.0 * points, points[:4], points.astype("f4"), points.astype(complex)
+    for content in (None, None, b"", b"no table", *others):
+        for kept in tmp_path.iterdir():
+            if isinstance(content, bytes):
+                kept.write_bytes(content)
+            elif content is not None:
+                np.save(kept, content)
         np.testing.assert_array_equal(starts(np.ones(3), 8)[1:], box[:7])
-        assert len(list(tmp_path.iterdir())) == 1
+        (kept,) = tmp_path.iterdir()
+        np.testing.assert_array_equal(np.load(kept), points)
+    # What has the form of such a set is read, not drawn.
+    np.save(kept, points[::-1])
+    np.testing.assert_array_equal(starts(np.ones(3), 8)[1:], box[:0:-1])
     monkeypatch.setattr(jit, "CACHE", tmp_path / "gone")
     np.testing.assert_array_equal(starts(np.ones(3), 8)[1:], box[:7])
 

@@ -29,8 +29,7 @@ def cases(draw: st.DrawFn) -> tuple[Dimensionless, float, int]:
     return model, 10.0 ** draw(st.floats(-1.0, 0.7)), draw(st.integers(0, 2**32 - 1))
 
 
-@pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(cases())
 def test_equals_the_general_kernel(case: tuple[Dimensionless, float, int]) -> None:
     check_case(*case)

@@ -286,7 +286,6 @@ def test_no_current_is_lost_at_a_summing_node() -> None:
     assert moved == len(circuit.states)
 
 
-@pytest.mark.slow
 def test_loads_know_both_channels() -> None:
     """The current of every output against a fine sample of the nodal equations."""
     result = made("two phases")
@@ -296,8 +295,8 @@ def test_loads_know_both_channels() -> None:
     flow = circuit_flow(reduction.system(), design, response)
     orbit = on_circuit(reduction.system(), design, response)
     for start, periods in ((orbit.start, orbit.n), (np.zeros(4), 20)):
-        run = flow.run(start, periods, points=500)
-        angle = 2.0 * np.pi * np.arange(len(run.strobes)) / 500
+        run = flow.run(start, periods, points=200)
+        angle = 2.0 * np.pi * np.arange(len(run.strobes)) / 200
         volts = zip(flow.drive.at(angle), flow.drive.second_at(angle), strict=True)
         peaks: dict[str, float] = {}
         for x, (u, w), phase in zip(run.strobes, volts, angle, strict=True):

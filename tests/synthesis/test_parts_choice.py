@@ -163,7 +163,6 @@ def test_random_targets(seed: int) -> None:
 # Refusals.
 
 
-@pytest.mark.slow
 def test_unreachable_names_what_binds() -> None:
     narrow = {
         "frequency": CircuitSpec(resistors=("E24",), frequency=(1e6, 2e6)),

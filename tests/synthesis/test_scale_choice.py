@@ -329,7 +329,6 @@ def test_an_error_above_the_largest_accepted_one_is_refused() -> None:
     assert design(ONE, max_error=0.01).errors.max_error <= 0.01
 
 
-@pytest.mark.slow
 def test_a_refusal_says_what_conflicts_and_how_far_it_has_to_give() -> None:
     with pytest.raises(Unreachable) as refused:
         design(ONE, frequency=(6e4, 7e4))
@@ -340,7 +339,6 @@ def test_a_refusal_says_what_conflicts_and_how_far_it_has_to_give() -> None:
     assert all(check.holds for check in needed.checks)
 
 
-@pytest.mark.slow
 def test_a_refusal_says_what_the_catalogue_lacks() -> None:
     """Far slower than any capacitor that is sold allows: its largest, not the range, is in the way,
     and the band alone says how slow the circuit has to be."""

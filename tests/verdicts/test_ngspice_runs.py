@@ -130,6 +130,10 @@ def test_the_way_is_looked_at_no_longer_than_it_takes(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Flow, "run", counted)
     periods = periods_to_settle(flow, 1.2 * who.orbit.start, who.orbit)
     assert sum(spent) <= 2 * periods + 2 * ngspice_runs.STRETCH
+    spent.clear()
+    never = replace(who.orbit, start=2.0 * who.orbit.start, multipliers=np.array([0.1 + 0j]))
+    assert periods_to_settle(flow, who.orbit.start, never, 100) == math.inf
+    assert sum(spent) <= 100 + 2 * ngspice_runs.STRETCH
 
 
 # ---------------------------------------------------------------------------------------------

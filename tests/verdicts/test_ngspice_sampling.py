@@ -30,6 +30,7 @@ from designer.verdicts.cross_check import (
     ask_random,
     longest_way,
     margin_share,
+    not_asked,
 )
 from designer.verdicts.verdict import Answer, Question, Verdict
 
@@ -71,17 +72,20 @@ def test_the_random_subset_and_every_slow_one() -> None:
 
 def test_where_ways_are_long_the_first_boards_are_asked() -> None:
     """At 1000 steps a period 1 - ρ = 5/512 takes 512 000 steps: of 10 million 19 fit. Boards whose
-    way is too long are named at no cost; after the last that fits no quick one is asked."""
+    way is too long are named at no cost; after the last that fits no quick one is asked, and no
+    other that is too long: these would be more of those asked than of the boards."""
     settings = SolverSettings("trap", 1.0 / (300.0 * 1000.0))
     slow = replace(question(), settings=settings)
     assert STEPS_EACH * NOMINAL_SAMPLES == 10_000_000
     assert longest_way(slow) == pytest.approx(1000.0, abs=1.0)
     radii = [1.0 - 5.0 / 4096.0] * 3 + [1.0 - 5.0 / 512.0] * 30 + [0.1] * 10
+    radii.append(radii[0])
     answers = [replace(BLANK, sample=i, radius=r) for i, r in enumerate(radii)]
     asks = ask_random(answers)
     kept = affordable(asks, answers, [slow])
     nominal = [a.sample for a in kept if a.kind is StartKind.NOMINAL]
     assert nominal == list(range(3 + 19))
+    assert not_asked(asks, kept, [slow, slow]) == (11 + 10 + 1, 0)
     assert [a for a in kept if a.kind is StartKind.OWN] == [
         a for a in asks if a.kind is StartKind.OWN
     ]

@@ -34,8 +34,8 @@ from designer.yields.tolerance_study import check
 from designer.yields.yield_count import Yield
 from tests.shared.closed_forms import irwin_hall
 from tests.shared.exploring import quick
-from tests.shared.model_text import COARSE_RECTIFIER, SMALL
-from tests.shared.system_text import clearance, system_text, table
+from tests.shared.model_text import SMALL
+from tests.verdicts.test_verdict import plan
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -650,17 +650,13 @@ def test_what_is_foretold_of_boards_is_what_they_show() -> None:
     assert {"", "1-1-1"} == set(quickly)
 
 
-@pytest.mark.slow
 def test_answers_to_a_drive_that_is_no_sine_come_slowly() -> None:
-    ground = ("a", "ground")
-    text = system_text(
-        {"a": 1.0}, {ground: 1.0}, {ground: 0.2},
-        clearance("A", *ground, upper=0.5, lower=0.5, stiffness=9.0),
-        table("force", on="a", amplitude=1.0, harmonics=[[3, 0.2, 0.1]]),
-        table("response", omega=1.3),
-        COARSE_RECTIFIER,
-    )  # fmt: skip
-    assert not drawing_of(text).quick
+    p = plan(1)
+    sine, log = p.questions[0], AnswerLog(StoredParts(), "")
+    waves = ((1, 1.0, 0.0), (3, 0.2, 0.1))
+    other = replace(sine, excitation=replace(sine.excitation, shape=waves))
+    for question, compiled in ((sine, True), (other, False)):
+        assert drawn_boards.Drawing(p, question, 1, lambda: None, log).quick is compiled
 
 
 # ---------------------------------------------------------------------------------------------

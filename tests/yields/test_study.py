@@ -30,7 +30,7 @@ from designer.folders.study_stores import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.verdicts import exact_circuit, ngspice_runs
+from designer.verdicts import cross_check, exact_circuit, ngspice_runs
 from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.verdicts.verdict import BLOCK, Answer, Verdict
 from designer.yields import layers, tolerance_study
@@ -254,6 +254,48 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
         (difference,) = both.differences
         assert difference.sample == 45
         assert difference.explanation == "another attractor from the nominal orbit"
+
+
+def test_boards_beyond_the_limit_of_steps_are_counted_and_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A million steps a board of the second question: ten of fifty fit, and ten next to a boundary
+    are asked all the same."""
+    made = Fixed(10**9)
+
+    def fill_cross_checks(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[CrossCheck]:
+        return [
+            CrossCheck(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+        ]
+
+    monkeypatch.setattr(layers, "samples_task", made)
+    monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
+    p = plan(60)
+    (answer, *_) = made(p, range(1))(1, lambda: None)
+    way = cross_check.least_way(1, answer.radius)
+    coarse = replace(p.questions[0], settings=SETTINGS)
+    step = 1.0 / (coarse.excitation.frequency * (1e6 - 1.0) / way)
+    fine = replace(coarse, settings=replace(SETTINGS, max_step=step))
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    checked: Any = (None, None, None)
+    study = Study(checked, replace(p, questions=(coarse, fine)), (0, 2), {1: "not shown"}, ())
+    pool: Any = object()
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), said, "auto")
+    study = work.cross_checked(work.sampled(study))
+    nominal = [c for c in study.cross_checks if c.question == 1 and c.kind is StartKind.NOMINAL]
+    random = {c.sample for c in nominal if c.why is Why.RANDOM}
+    assert random == set(range(10))
+    asked = {c.sample for c in nominal if c.sample < cross_check.NOMINAL_SAMPLES}
+    left = cross_check.NOMINAL_SAMPLES - len(asked)
+    assert study.not_asked == (0, left)
+    assert [study.not_asked_of(i) for i in range(3)] == [0, 0, left]
+    (note,) = notes
+    assert note.startswith(f"response 3: {left} boards are not asked in ngspice")
+    alone = StudyWork(1, None, Stores(), LocalRunner(1), said, "exact").cross_checked(study)
+    assert alone.cross_checks == ()
+    assert notes == [note]
 
 
 def _first(made: Fixed) -> Any:
