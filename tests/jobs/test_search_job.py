@@ -14,6 +14,7 @@ from typing import Any, cast
 import pytest
 
 import designer
+from designer.answers.search_answer import ConfirmedCure
 from designer.base.design_folder import MODEL, Folder
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.manifest import StageName
@@ -35,6 +36,7 @@ from designer.model.model_file import ModelFile, parse_model_file, read_model_fi
 from designer.verbs.search import KINDS
 from designer.verdicts.verdict import Verdict
 from tests.shared.search_cases import asked, made
+from tests.shared.typed_answers import OF_VERB, assert_type
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank", "designs_are_made_once")
 
@@ -408,7 +410,8 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """What the search itself does is another test's: here a plain choice of parts stands for it."""
+    """What the search itself does is another test's: here a plain choice of parts stands for it, so
+    that the cure alone is of its type."""
     model, out = tmp_path / "model.toml", tmp_path / "out"
     model.write_text(asked(response, objective="match"), encoding="utf-8")
 
@@ -422,12 +425,14 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     found = nothing | {"search": {"final": nothing, "contributions": []}, "confirmation": nothing}
     monkeypatch.setattr("designer.jobs.search_job.search_into", chosen)
     monkeypatch.setattr("designer.verbs.search.whole_job", lambda answer: None)
+    monkeypatch.setitem(OF_VERB, "search", object)
     monkeypatch.setattr(search_job, "LEAST", 3)  # boards in ngspice
     monkeypatch.setattr(search_job, "SAMPLES", 12)
     without = [word for kind in KINDS for word in ("--without", kind)]
     options = ("--out", out, *target, *without, "--jobs", 1, "-q")
     assert run("search", model, *options, "--json") == (0 if reached else 1)
     answer = json.loads(capsys.readouterr().out)
+    assert_type(answer["cure"], ConfirmedCure)
     confirmation = answer["cure"].pop("confirmation")
     assert answer["cure"] == read(out / "cure.json")
     assert answer["cure"]["reached"] is reached
