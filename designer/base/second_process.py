@@ -14,7 +14,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar
 from queue import SimpleQueue
@@ -50,11 +50,11 @@ class Awaited(Generic[Result]):
             self._known = (self._function(*self._arguments),) if answered is None else answered
         return self._known[0]
 
-    @property
-    def ready(self) -> bool:
-        """Whether the other process has done with it, or its result is known. What is called here
-        is not ready before it is asked for."""
-        return self._known is not None or (self._there is not None and self._there.done())
+    def wait(self) -> bool:
+        """Wait until the other process has done with it; False at once where it is called here."""
+        if self._there is not None:
+            wait([self._there])
+        return self._there is not None
 
 
 Ask = Callable[..., Awaited[Any]]

@@ -107,8 +107,7 @@ def write_last(
     folder.write(board_files.NOTES, board_files.notes(synthesis, subject, cost))
     for name, content in drawing().items():
         folder.write(name, content)
-    # Of several recipes half wait there for what the process is at; of one each trial would.
-    recipes = start_recipes(synthesis, jobs, other if len(responses) > 1 else idle)
+    recipes = start_recipes(synthesis, jobs, other)
     folder.write(SETUP, setup_csv(design, responses, recipes, synthesis.modelfile.si))
     if better_stage is not None:
         synthesis = replace(synthesis, better_stage=better_stage())

@@ -20,7 +20,7 @@ from designer.base.second_process import Ask
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Ahead, Synthesis
-from designer.folders import board_files, design_files, kicad_files
+from designer.folders import board_files, design_files
 from designer.folders.design_source import (
     design_answer,
     design_inputs,
@@ -155,6 +155,8 @@ def write_design(
     the interpreter, and takes half of what follows. other_stage : as of ``StageRunner``; asked once
     the project is written.
     """
+    from designer.folders import kicad_files  # parts stand before it is needed
+
     progress.stage("files of the design")
     with errors_in(synthesis.modelfile):
         files = design_files.texts(synthesis)

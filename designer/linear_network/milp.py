@@ -29,7 +29,7 @@ NODES = 3000
 answers do not depend on time."""
 PRICE_WEIGHT = 1e-3
 """Of one price class against one distinct value: price only breaks ties."""
-STATISTICS, COMMAND_LINE = "scipy.stats", "designer.cli.entry"
+STATISTICS, QUADRATIC, COMMAND_LINE = "scipy.stats", "osqp", "designer.cli.entry"
 """Modules."""
 
 
@@ -57,22 +57,26 @@ class _Deferred(ModuleType):
 
 
 def import_cvxpy() -> None:
-    """Import cvxpy without SciPy's statistics, which take four times as long as all else of it: one
-    of its atoms calls one function of theirs.
+    """Import cvxpy without what takes longest of it. SciPy's statistics take four times as long as
+    all else: one of its atoms calls one function of theirs. OSQP comes with a template engine, and
+    no program here is quadratic: cvxpy takes it as not installed.
 
-    They are imported in a process that is not the command line's own, whose other threads might ask
+    Both are there in a process that is not the command line's own, whose other threads might ask
     for them meanwhile, and where a version of cvxpy needs more of them.
     """
-    if STATISTICS not in sys.modules and COMMAND_LINE in sys.modules:
-        stand_in = sys.modules[STATISTICS] = _Deferred(STATISTICS)
+    modules: dict[str, ModuleType | None] = sys.modules  # type: ignore[assignment]
+    stand_ins = {STATISTICS: _Deferred(STATISTICS), QUADRATIC: None}
+    if COMMAND_LINE in modules and not stand_ins.keys() & modules.keys():
+        modules |= stand_ins
         try:
             import_module("cvxpy")
-        except Exception:  # whatever it made of the stand-in
-            for name in [name for name in sys.modules if name.partition(".")[0] == "cvxpy"]:
-                del sys.modules[name]
+        except Exception:  # whatever it made of the stand-ins
+            for name in [name for name in modules if name.partition(".")[0] == "cvxpy"]:
+                del modules[name]
         finally:
-            if sys.modules.get(STATISTICS) is stand_in:
-                del sys.modules[STATISTICS]
+            for name, stand_in in stand_ins.items():
+                if name in modules and modules[name] is stand_in:
+                    del modules[name]
     import_module("cvxpy")
 
 

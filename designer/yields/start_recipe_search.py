@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 import os
 import pickle
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from threading import Thread
 
 import numpy as np
 
@@ -59,8 +59,6 @@ ASIDE = 0.10
 """How far from the wanted frequency a short sweep begins."""
 SOFT = 0.5
 """Share of the amplitude at which an amplitude ramp begins."""
-AHEAD = 2
-"""Questions that another process may be asked for at a time."""
 ABOVE = 1.1
 """Where the long sweep begins, over the highest resonance inside the clearance."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
@@ -69,30 +67,34 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter.
 
-    other : a process that takes questions from the last one on, once it is idle, or half of the
-    trials of a single one; no recipe depends on it. What only calls functions here is never idle
-    (``Awaited.ready``), and takes none.
+    other : a process that takes questions once it is idle, and half of the trials once none is
+    left; no recipe depends on it. What only calls functions here takes no question.
     """
     count = len(plan.questions)
     if other is None or jobs < 2 or not count:
         return tuple(_named(bench, n, count) for n, bench in enumerate(_benches(plan, jobs)))
     pickled, here, there = pickle.dumps(plan), jobs - jobs // 2, jobs // 2
-    benches = _benches(plan, here)
-    if count == 1:
-        elsewhere = partial(other, _worked_there, pickled, there)
-        return (_named(replace(benches[0], elsewhere=elsewhere), 0, count),)
-    idle, left = other(os.getpid), deque(range(count))
+    benches, left = _benches(plan, here), iter(range(count))
     waiting: dict[int, Awaited[Recipe]] = {}
     mine: dict[int, Recipe] = {}
-    while left:
-        busy = sum(not answer.ready for answer in waiting.values())
-        if idle.ready and busy < AHEAD and len(left) > 1:
-            n = left.pop()
-            waiting[n] = other(_found_there, pickled, there, n)
-        else:
-            n = left.popleft()
-            mine[n] = _named(benches[n], n, count)
-    return tuple(waiting[n]() if n in waiting else mine[n] for n in range(count))
+
+    def hand_out() -> None:
+        for number in left if other(os.getpid).wait() else ():
+            waiting[number] = other(_found_there, pickled, there, number)
+            waiting[number].wait()
+
+    beside = Thread(target=hand_out, daemon=True)
+    try:
+        for number in left:
+            elsewhere = partial(other, _worked_there, pickled, there, number)
+            bench = replace(benches[number], elsewhere=elsewhere, busy=beside.is_alive)
+            if not mine:
+                beside.start()
+            mine[number] = _named(bench, number, count)
+    finally:
+        list(left)  # of those nobody is asked any more
+    beside.join()
+    return tuple(mine[n] if n in mine else waiting[n]() for n in range(count))
 
 
 def _named(bench: _Bench, number: int, count: int) -> Recipe:
@@ -114,10 +116,10 @@ def _benches_of(pickled: bytes, jobs: int) -> tuple[_Bench, ...]:
 
 
 def _worked_there(
-    pickled: bytes, jobs: int, are_samples: bool, trials: Sequence[_Trial]
+    pickled: bytes, jobs: int, number: int, are_samples: bool, trials: Sequence[_Trial]
 ) -> list[bool]:
-    """``_Bench.worked`` of a plan's one question, for a process that is asked often about it."""
-    return _benches_of(pickled, jobs)[0].worked(are_samples, trials)
+    """``_Bench.worked`` of the question of this number, for a process that is asked often."""
+    return _benches_of(pickled, jobs)[number].worked(are_samples, trials)
 
 
 def _found_there(pickled: bytes, jobs: int, number: int) -> Recipe:
@@ -224,8 +226,8 @@ class _Trial:
 @dataclass(frozen=True)
 class _Bench:
     """Where the recipes of a question are tried. able : sample boards that show it as built, with
-    the orbits that they show. elsewhere : ``worked`` by another process; what it gives waits for
-    the answer."""
+    the orbits that they show. elsewhere : ``worked`` by another process, unless that is ``busy``;
+    what it gives waits for the answer."""
 
     question: Question
     nominal: Ensemble
@@ -233,6 +235,7 @@ class _Bench:
     jobs: int
     able: Mapping[int, Orbit] = field(default_factory=dict)
     elsewhere: Callable[[bool, Sequence[_Trial]], Callable[[], list[bool]]] | None = None
+    busy: Callable[[], bool] = bool
 
     def on_nominal(self, trials: _Trials, count: int = TRIALS) -> _Trials:
         """The trials from the first ``count`` phases, without those that were tried before."""
@@ -261,9 +264,9 @@ class _Bench:
 
     def _shared(self, are_samples: bool, trials: Sequence[_Trial]) -> list[bool]:
         """``worked``, half of it elsewhere: by boards, for the starts of one share its tables."""
-        boards = list(dict.fromkeys(t.board for t in trials))
-        if self.elsewhere is None or len(trials) < 2:
+        if self.elsewhere is None or len(trials) < 2 or self.busy():
             return self.worked(are_samples, trials)
+        boards = list(dict.fromkeys(t.board for t in trials))
         others = set(boards[1::2])
         away = [t.board in others if others else k % 2 == 1 for k, t in enumerate(trials)]
         halves = [

@@ -85,8 +85,8 @@ def test_a_result_is_kept_and_the_function_called_once() -> None:
     calls: list[int] = []
     with other_process(1) as other:
         answer = other(calls.append, 1)
-        told = [answer.ready, answer(), answer(), answer.ready]
-    assert told == [False, None, None, True]
+        told = [answer.wait(), answer(), answer()]
+    assert told == [False, None, None]
     assert calls == [1]
 
 

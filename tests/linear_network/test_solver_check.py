@@ -50,9 +50,9 @@ def test_a_wrong_answer_is_said(monkeypatch: pytest.MonkeyPatch, wrong: float | 
     assert "highspy>=1.15" in words
 
 
-def test_the_command_line_s_cvxpy_comes_without_statistics() -> None:
-    """Of SciPy's, which come once the atom that needs them has a value: relative entropy of two
-    matrices with the same eigenvectors is that of their eigenvalues."""
+def test_the_command_line_s_cvxpy_comes_without_what_takes_long() -> None:
+    """SciPy's statistics come once the atom that needs them has a value: relative entropy of two
+    matrices with the same eigenvectors is that of their eigenvalues. OSQP can be imported later."""
     script = textwrap.dedent(
         """
         import sys
@@ -61,7 +61,7 @@ def test_the_command_line_s_cvxpy_comes_without_statistics() -> None:
         from designer.linear_network.milp import import_cvxpy
 
         import_cvxpy()
-        assert "scipy.stats" not in sys.modules
+        assert not {"scipy.stats", "osqp"} & sys.modules.keys()
         import cvxpy as cp
 
         p, q = np.array([0.25, 0.75]), np.array([0.5, 0.5])
@@ -70,6 +70,9 @@ def test_the_command_line_s_cvxpy_comes_without_statistics() -> None:
         from scipy.stats import norm
 
         assert norm.cdf(0.0) == 0.5
+        import osqp
+
+        assert osqp.OSQP
         """
     )
     done = subprocess.run(
