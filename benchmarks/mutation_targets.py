@@ -85,7 +85,8 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         *_of(
             "dynamics",
             "piecewise_linear",
-            "dynamics/piecewise_linear circuit/reduction synthesis/drive_channels",
+            "dynamics/piecewise_linear dynamics/force_laws circuit/reduction "
+            "synthesis/drive_channels",
         ),
         *_of("dynamics", "step_budget", "dynamics/step_budget"),
         *_of("dynamics", "flow", "dynamics/step_budget dynamics/flow dynamics/drive_shape"),

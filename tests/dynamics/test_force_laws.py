@@ -124,6 +124,22 @@ def test_a_law_is_a_clearance_whose_impacts_are_not_counted() -> None:
     assert same.counts.total == 0
 
 
+@pytest.mark.parametrize(("constant", "images"), [(0.0, {1.0: -1.0, -1.0: 1.0}), (0.1, {})])
+def test_corners_are_images_of_each_other_where_the_motion_has_one(
+    constant: float, images: dict[float, float]
+) -> None:
+    """A constant force leaves an odd law's motion without a mirror image."""
+    law = table("law", name="F", between=GROUNDED, points=[[-2, -7], [-1, -1], [1, 1], [2, 7]])
+    force = table("force", on="a", amplitude=1.0, constant=constant)
+    spring, damper = {GROUNDED: 1.0}, {GROUNDED: 0.2}
+    text = system_text({"a": 1.0}, spring, damper, force, law)
+    system = model_flow(parse_model_file(text).model, 1.0).system
+    places = [-corner.row[-1] / corner.row[0] for corner in system.corners]
+    found = {places[k]: places[i] for k, i in enumerate(system.corner_images) if i >= 0}
+    assert found == images
+    assert sorted(places) == [-1.0, 1.0]
+
+
 @pytest.mark.parametrize("ratio", [0.6, 0.8, 1.5])
 def test_friction_comes_to_den_hartog_s_closed_form(ratio: float) -> None:
     """J. P. Den Hartog, Trans. ASME 53 (1931): a driven mass on a spring with Coulomb friction that

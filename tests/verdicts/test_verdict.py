@@ -78,6 +78,7 @@ def test_an_exponent_counts_in_the_models_time() -> None:
     )
     assert question.judge(chaotic(50.0, 0.5))[0] is Verdict.OK
     assert question.judge(chaotic(40.0, 0.5))[0] is Verdict.LOST
+    assert question.steps == 0.0, "ngspice has no settings here and is not asked"
 
 
 def test_without_an_expectation_the_nominal_motion_without_a_period_is_wanted() -> None:
