@@ -89,6 +89,15 @@ def refused(words: list[str], capfd: pytest.CaptureFixture[str], *said: str) -> 
 # Every rule
 
 
+def test_a_rule_is_named_while_it_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some take seconds: who waits is told which."""
+    told: list[str] = []
+    monkeypatch.setattr(run_rules, "doing", told.append)
+    monkeypatch.setattr(run_rules, "LOOKS", dict.fromkeys(run_rules.LOOKS, lambda _: []))
+    outcomes = run_rules.on_circuit(base(), {})
+    assert told == [f"design rule {outcome.rule.id}" for outcome in outcomes] != []
+
+
 def test_every_rule_has_a_function_and_a_pair() -> None:
     ids = [rule.id for rule in RULES]
     assert len(set(ids)) == len(ids)

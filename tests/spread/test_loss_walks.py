@@ -57,6 +57,16 @@ def test_boards_that_have_walked_have_the_law_of_lost_boards() -> None:
         assert middle.std() == pytest.approx(12**-0.5, abs=0.02)
 
 
+@pytest.mark.parametrize(("stay", "longer"), [(1.0, True), (0.4, False)])
+def test_the_next_step_is_longer_where_most_boards_stay_lost(stay: float, longer: bool) -> None:
+    each = LossWalk.of("2-2-2", 3.0, np.random.default_rng(1).random((BOARDS, 5)), 0.1)
+    before = each.next_width / each.width
+    each.narrow(np.arange(BOARDS) < stay * BOARDS)
+    assert each.width == 3.0 * before
+    assert (each.next_width / each.width < before - 0.05) is longer
+    assert each.share == pytest.approx(0.1 * stay, rel=0.05)
+
+
 def test_a_loss_that_adds_next_to_nothing_walks_less() -> None:
     """Beside a loss that is known: far rarer than it, and half as common."""
     rng = np.random.default_rng(4)

@@ -154,6 +154,35 @@ def test_the_interval_covers_a_probability_that_is_known(
     assert all(len(r.regions) >= 1 and r.regions[0].becomes == "1-0-0" for r in found)
 
 
+def test_a_board_without_an_answer_is_neither_lost_nor_fine(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beyond the threshold one more coordinate leaves half of the boards without one."""
+    truth = 0.5 * irwin_hall(12, 9.6)
+
+    def lost(points: Array) -> list[str]:
+        beyond = zip(points[:, :12].sum(axis=1), points[:, 12], strict=True)
+        return ["" if s <= 9.6 else "failed" if u < 0.5 else "1-0-0" for s, u in beyond]
+
+    found = [estimated(monkeypatch, 13, lost, seed) for seed in range(6)]
+    assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.2)
+    assert np.mean([r.unanswered for r in found]) == pytest.approx(truth, rel=0.2)
+
+
+@pytest.mark.parametrize("threshold", [0.0, 0.8])
+def test_lost_boards_are_in_two_where_they_lie_further_apart_than_chance_has_it(
+    threshold: float,
+) -> None:
+    """On both sides of a sum's middle: their variance along the sum is 0.17, where chance makes
+    0.1 of 2000 boards of variance 1/12."""
+    points = np.random.default_rng(7).random((8000, 12))
+    here = np.abs(points.sum(axis=1) - 6.0) > threshold
+    here &= np.cumsum(here) <= 2000
+    sides = list(loss_regions._sides(points, np.ones(len(points)), here))
+    assert len(sides) == (2 if threshold else 1)
+    assert (np.sum(sides, axis=0) == here).all()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("ends", [False, True])
 def test_two_regions_of_one_kind_of_loss_are_found(
