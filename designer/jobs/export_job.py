@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base import progress
 from designer.base.defaults import Dialect
 from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import EnvironmentMissing
 from designer.base.frames import table_html
 from designer.base.manifest import ORDERS, DeckStage, OrderStage, StageName, Stages
 from designer.base.plain_json import FORMAT
-from designer.base.progress import Progress
 from designer.base.seal import sha256
 from designer.base.version import __version__
 from designer.board.board_facts import check_edge
@@ -101,7 +101,6 @@ class Export:
     modelfile: ModelFile
     out: Path
     options: Options
-    progress: Progress
 
     def project(self) -> ExportResult:
         """Write the KiCad project."""
@@ -114,10 +113,10 @@ class Export:
             listed = folder.manifest.files.items()
             files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
             note = "so does its KiCad project: --overwrite makes it anew, with what is here"
-            self.progress.note(note)
+            progress.note(note)
         todo = self._decide(folder, kicad_files.stages(inputs, files))
         if todo:
-            self.progress.stage("KiCad project")
+            progress.stage("KiCad project")
             kicad_files.write(folder, synthesis, inputs, files)
         return _result(runner, list(files), reused and not todo)
 
@@ -125,7 +124,7 @@ class Export:
         """Write the project where there is none, and its board for another router."""
         runner, synthesis, reused = self._design()
         self._board(runner, None)
-        write_design(runner.folder, synthesis, file, self.options, self.progress)
+        write_design(runner.folder, synthesis, file, self.options)
         return _result(runner, [], reused, {"dsn": str(file)})
 
     def routed(
@@ -145,7 +144,7 @@ class Export:
             made = self._design()
         runner, synthesis, reused = made
         folder = runner.folder
-        routing = route_in_folder(folder, synthesis, self.progress, session, layers)
+        routing = route_in_folder(folder, synthesis, session, layers)
         listed = {} if folder.manifest is None else folder.manifest.files
         files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
         return _result(runner, files, reused, {"routing": routing})
@@ -158,7 +157,7 @@ class Export:
         stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
         todo = self._decide(folder, stages)
         if todo:
-            self.progress.stage("decks")
+            progress.stage("decks")
             texts = {
                 name: deck_text(synthesis, dialect)
                 for dialect, name in names.items()
@@ -180,7 +179,7 @@ class Export:
             version = needed_version()
         except KicadFailed as why:
             raise EnvironmentMissing(f"{why}: --fab needs it") from None
-        names, parts, progress = asked.fabs, asked.parts, self.progress
+        names, parts = asked.fabs, asked.parts
         fabs(names, load_catalog().folders)
         check_accepted(asked.accepted)
         stock = () if parts is None else stock_rows(parts, "--parts")
@@ -226,7 +225,7 @@ class Export:
 
     def _design(self) -> tuple[StageRunner, Synthesis, bool]:
         """The folder with its design, and whether the design was there already."""
-        runner = StageRunner(self.modelfile, self.out, self.options, self.progress)
+        runner = StageRunner(self.modelfile, self.out, self.options)
         reused = not runner.decide()
         return runner, runner.design(), reused
 

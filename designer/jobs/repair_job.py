@@ -21,7 +21,7 @@ from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
-from designer.base.progress import Progress
+from designer.base.progress import Progress, note, reported, stage, watched, whole
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
 from designer.centering.repair_branch import KINDS, kind_named, repaired
@@ -87,6 +87,7 @@ class CureResult:
         return table_html(title, rows, f"price {self.answer['price']:.4g}")
 
 
+@reported
 def cure(
     folder: Path | str,
     *,
@@ -128,8 +129,7 @@ def cure(
     )
     if "yield" not in settings:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
-    progress = Progress() if progress is None else progress
-    with progress.whole(usual_times.REPAIRED):
+    with whole(usual_times.REPAIRED):
         return repair_into(
             path,
             target=settings["yield"],
@@ -137,7 +137,6 @@ def cure(
             out=None if out is None else Path(out),
             without=settings.get("without", ()),
             options=Options(settings.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
-            progress=progress,
         )
 
 
@@ -149,18 +148,16 @@ def repair_into(
     out: Path | None = None,
     without: Collection[str] = (),
     options: Options | None = None,
-    progress: Progress | None = None,
 ) -> CureResult:
     """As ``cure``, with nothing taken over from an earlier one. target : the yield."""
     options = Options() if options is None else options
-    progress = Progress() if progress is None else progress
     options.check()
     unwanted = _checked(target, budget, without)
     if out is not None:
         if out.resolve() == path.resolve():
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place where something else stands
-    base = read_design(path, progress=progress)
+    base = read_design(path, progress=watched())
     refuse_unreachable(base.modelfile, target, budget, without)
     folder = Folder(path)
     inputs = {
@@ -180,15 +177,15 @@ def repair_into(
             _check_room(base, out, options)
         choice = fidelity_choice.choose(folder)
         if choice.rung == "ngspice":
-            progress.note(
+            note(
                 f"{choice.reason}; a cure is decided on the exact circuit all the same: ask "
                 "ngspice about the cured design (tolerance --rung ngspice)"
             )
-        _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
+        _find_and_write(folder, stages, base, target, budget, unwanted, options)
     answer: CureAnswer = folder.json(REPAIR)
-    renew_report(folder, progress.note)
+    renew_report(folder, note)
     if out is not None:
-        _write_design(base, answer, out, options, progress)
+        _write_design(base, answer, out, options)
     return CureResult(answer, bool(answer["reached"]), not todo)
 
 
@@ -200,13 +197,12 @@ def _find_and_write(
     budget: float | None,
     unwanted: frozenset[str],
     options: Options,
-    progress: Progress,
 ) -> None:
     """Find the cheapest repair of the design ``base`` and write it into its folder."""
     began = time.perf_counter()
     studies_before = {}
     if folder.manifest and STUDIES in folder.manifest.files:
-        studies_before = _LINES.load(folder / STUDIES, progress.note, folder.vouches)
+        studies_before = _LINES.load(folder / STUDIES, note, folder.vouches)
     origin = provenance(
         base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
     )
@@ -227,9 +223,8 @@ def _find_and_write(
                 seed=options.seed,
                 jobs=options.jobs,
                 verdict_cache=VerdictCache(studies_before, save),
-                progress=progress,
             )
-        progress.stage("report of the cure")
+        stage("report of the cure")
         from designer.base.figure_style import to_png, to_svg
         from designer.centering.repair_plots import front_chart  # matplotlib is not needed before
 
@@ -259,14 +254,12 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
     folder.decide(design_stage(base.modelfile, inputs), overwrite=True, resume=False)
 
 
-def _write_design(
-    base: Synthesis, answer: CureAnswer, out: Path, options: Options, progress: Progress
-) -> None:
+def _write_design(base: Synthesis, answer: CureAnswer, out: Path, options: Options) -> None:
     """The repaired design as a design folder; nothing where there is no repair."""
     if not answer["reached"]:
-        progress.note("no cure: no design is written")
+        note("no cure: no design is written")
         return
-    progress.stage("cured design")
+    stage("cured design")
     synthesis = repaired(base, Upgrades.of_dict(answer["upgrades"]))
     folder = Folder(out)
     stages = design_stage(
@@ -274,7 +267,7 @@ def _write_design(
     )
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         with other_process(options.workers) as other:
-            write_design(folder, synthesis, stages, options, progress, other)
+            write_design(folder, synthesis, stages, options, other)
 
 
 def is_out_of_reach(folder: Folder) -> bool:

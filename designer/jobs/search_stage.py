@@ -11,11 +11,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base import progress
 from designer.base.design_folder import ASKED, DESIGN_FILES, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST
 from designer.base.plain_json import FORMAT, dumps
-from designer.base.progress import Progress
 from designer.base.second_process import other_process
 from designer.base.version import __version__
 from designer.catalog.parts_catalog import load_catalog
@@ -47,9 +47,7 @@ RULES = 7
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 
-def searched_into(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress
-) -> ModelFile:
+def searched_into(modelfile: ModelFile, out: Path, options: Options) -> ModelFile:
     """Search for a design of this model file, unless the folder has one; the folder's model file.
 
     Raises
@@ -86,7 +84,7 @@ def searched_into(
     resumes = is_unfinished and options.resume
     trade = _trade_of(folder, modelfile, resumes=resumes)
     began = time.perf_counter()
-    windows = look(modelfile, catalog, options.workers, progress)
+    windows = look(modelfile, catalog, options.workers)
     origin = provenance(modelfile, catalog.hash, seed=options.seed, settings={"rules": RULES})
     if not resumes:
         (folder / CANDIDATES).unlink(missing_ok=True)
@@ -103,13 +101,12 @@ def searched_into(
             memory=memory,
             windows=windows,
             ask_agreement=AgreementCheck(pool, memory),
-            progress=progress,
         )
     final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)
     synthesis = replace(searched.synthesis, modelfile=final, seconds=time.perf_counter() - began)
     stages = design_stage(final, design_inputs(final, catalog))
     with other_process(options.workers) as other:
-        write_design(folder, synthesis, stages, options, progress, other)
+        write_design(folder, synthesis, stages, options, other)
     if trade is not None:
         trade = {**trade, "model": final.sha256}
     cost: Seconds = {"seconds": time.perf_counter() - began}

@@ -48,13 +48,13 @@ def make_report(
 ) -> int:
     """Make the report that a command line asks for; the exit status.
 
-    report : takes ``progress`` and what the parser reads, by name. arguments : the command line;
-    None for this process's.
+    report : takes what the parser reads, by name. arguments : the command line; None for this
+    process's.
     """
     asked = parser.parse_args(arguments)
     try:
-        with progress_for(False) as progress:
-            report(progress=progress, **vars(asked))
+        with progress_for(False):
+            report(**vars(asked))
     except DesignerError as error:
         print(f"{parser.prog.rpartition('.')[2]}: {error}", file=sys.stderr)
         return error.exit_status

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported, stage
 from designer.base.units import format_quantity
 from designer.verbs.console import say, table
 from designer.verbs.declared import Verb, option
@@ -42,6 +42,7 @@ class CatalogAnswer:
         return {"format": 1, **found, "hash": self.entries.hash}
 
 
+@reported
 def catalog(
     check: Annotated[
         str | None, option("--check", "NAME", "Measure this op-amp's model against its figures.")
@@ -64,8 +65,7 @@ def catalog(
     from designer.spice.opamp_check import checks
 
     opamp = entries.opamp(check)
-    if progress is not None:
-        progress.stage(f"{check} in ngspice")
+    stage(f"{check} in ngspice")
     return CatalogAnswer(entries, check, tuple(checks(opamp)))
 
 

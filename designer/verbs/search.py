@@ -12,7 +12,7 @@ from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
 from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.printed import tell
-from designer.base.progress import Progress
+from designer.base.progress import Progress, note, reported, whole
 from designer.verbs import next_steps
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Source, Verb, option
@@ -32,6 +32,7 @@ CURED = "cured"
 """Folder of the repaired design, in that of the search whose design is repaired."""
 
 
+@reported
 def search(
     model: Source,
     out: Out = None,
@@ -103,7 +104,6 @@ def search(
             jobs=jobs,
             overwrite=overwrite,
             resume=resume,
-            progress=progress,
         )
     from designer.folders.model_source import source
     from designer.jobs import folder_numbers, search_job, usual_times
@@ -130,21 +130,20 @@ def search(
     options = folder_numbers.of_search(folder, options, words)
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(VERB.command, model=name, out=place)
-    progress = Progress() if progress is None else progress
     usual = usual_times.SEARCH if repair is None else {**usual_times.SEARCH, **usual_times.REPAIRED}
-    with progress.whole(usual):
-        found = search_job.search_into(modelfile, folder, options, progress, command)
+    with whole(usual):
+        found = search_job.search_into(modelfile, folder, options, command)
         confirmed, stood = None, True
         if repair is None:
             cured = None
         else:
-            cured = repair(folder, out=folder / CURED, options=options, progress=progress)
+            cured = repair(folder, out=folder / CURED, options=options)
             if cured.reached:
                 confirm = search_job.confirmed_repair
-                confirmed, stood = confirm(folder / CURED, options, progress)
+                confirmed, stood = confirm(folder / CURED, options)
     is_another_s = not found.reused if cured is None else not cured.reached
     if is_another_s and (folder / CURED / DESIGN).exists():
-        progress.note(f"{folder / CURED} holds an earlier design, which is not of this search")
+        note(f"{folder / CURED} holds an earlier design, which is not of this search")
     if cured is None:
         return found
     repaired = {**cured.answer, "confirmation": confirmed}

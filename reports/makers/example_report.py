@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from designer.base.defaults import cores
 from designer.base.page import Block, Page, PageSection, Verbatim
-from designer.base.progress import Progress
+from designer.base.progress import stage
 from designer.catalog.parts_catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.model.lumped_system import LumpedSystem
@@ -75,7 +75,6 @@ def report(
     seed: int = SEED,
     jobs: int | None = None,
     circuit: bool = True,
-    progress: Progress | None = None,
 ) -> None:
     """Make the report in the folder ``out``.
 
@@ -85,16 +84,15 @@ def report(
     ------
     InputError, Unreachable, EnvironmentMissing : as the verbs ``run``, ``export`` and ``rules``.
     """
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     file = read_model_file(model)
     example = EXAMPLES.get(model.stem, OTHER)
-    progress.stage("what the system shows", None)
+    stage("what the system shows", None)
     parts = [_system(file), *example.show(file), frequency_sweep(file, jobs)]
     parts[0] = replace(parts[0], blocks=[*parts[0].blocks, example.see])
     numbers = {"samples": samples, "seed": seed, "circuit": circuit}
     if circuit:
-        parts.append(board_part(model, out, example.board, samples, seed, jobs, progress))
+        parts.append(board_part(model, out, example.board, samples, seed, jobs))
     out.mkdir(parents=True, exist_ok=True)
     document = {
         "format": FORMAT,
