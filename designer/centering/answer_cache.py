@@ -7,8 +7,6 @@ short is left out, and so is a line that was damaged, which is said.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from designer.base.errors import InputError
 from designer.base.guarded_reading import UNREADABLE, read_bytes
 from designer.base.keyed_store import DAMAGED, UNSEALED, Note, read_line, sealed_line
 from designer.base.progress import quiet
+from designer.base.seal import json_hash
 
 FORMAT = 2
 
@@ -130,5 +129,4 @@ def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
 
 
 def _key(search: str, query: Any) -> str:
-    text = json.dumps([search, query], sort_keys=True)
-    return hashlib.sha256(text.encode("ascii")).hexdigest()[:24]
+    return json_hash([search, query])[:24]
