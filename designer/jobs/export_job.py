@@ -15,30 +15,27 @@ from typing import TYPE_CHECKING, Any
 from designer.base import progress
 from designer.base.defaults import Dialect
 from designer.base.design_folder import DESIGN, Folder
-from designer.base.errors import EnvironmentMissing
+from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.frames import table_html
 from designer.base.manifest import ORDERS, DeckStage, OrderStage, StageName, Stages
 from designer.base.plain_json import FORMAT
+from designer.base.schema import one_of
 from designer.base.seal import sha256
 from designer.base.version import __version__
 from designer.board.board_facts import check_edge
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import BoardFile, read_board
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
+from designer.catalog.design_rules import RULES
 from designer.catalog.fab import Fab, fab_limits, fabs
 from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
+from designer.design_rules.kicad_drc import OPEN, SHORT
 from designer.design_rules.kicad_program import KicadFailed, needed_version
 from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
-from designer.fabrication.order_refusal import (
-    accepted_failures,
-    check_accepted,
-    not_checked,
-    read_back,
-    refusals,
-)
 from designer.folders import board_files, kicad_files
 from designer.folders.design_files import design_provenance
 from designer.folders.model_source import design_inputs_of
@@ -296,3 +293,53 @@ def _result(
         **extras,
     }
     return ExportResult(answer, runner.folder.path, reused)
+
+
+WANTED = (OPEN, SHORT)
+"""Rules that have to be run and passed; any other may stay without a run."""
+
+
+def check_accepted(names: Sequence[str]) -> None:
+    """Whether these are rules whose failure may be accepted.
+
+    Raises
+    ------
+    InputError : no such rule, or one without which no board works.
+    """
+    known = [rule.id for rule in RULES if rule.id not in WANTED]
+    for name in names:
+        if name not in known:
+            raise InputError(None, "--accept", name, one_of(name, known))
+
+
+def refusals(outcomes: Sequence[RuleOutcome], accepted: Sequence[str] = ()) -> tuple[str, ...]:
+    """A line for each reason against an order; none where it may be sent.
+
+    accepted : rules that may fail.
+    """
+    return tuple(
+        f"{one.rule.id}: {one.found}; {one.do}"
+        for one in outcomes
+        if (one.status == FAIL and one.rule.id not in accepted)
+        or (one.rule.id in WANTED and one.status != PASS)
+    )
+
+
+def read_back(faults: Sequence[str]) -> tuple[str, ...]:
+    """A line for each fault that an order's files had when they were read back."""
+    do = "fill the zones anew, mend the board, and run export --fab again"
+    return tuple(f"order-files: {fault}; {do}" for fault in faults)
+
+
+def accepted_failures(outcomes: Sequence[RuleOutcome], accepted: Sequence[str]) -> tuple[str, ...]:
+    """A line for each rule that fails and is accepted."""
+    return tuple(
+        f"{one.rule.id}: {one.found}"
+        for one in outcomes
+        if one.status == FAIL and one.rule.id in accepted
+    )
+
+
+def not_checked(outcomes: Sequence[RuleOutcome]) -> tuple[str, ...]:
+    """A line for each rule that was not run, with the reason."""
+    return tuple(f"{one.rule.id}: {one.found}" for one in outcomes if one.status == NOT_RUN)

@@ -14,20 +14,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base.csv_tables import csv_text
 from designer.base.defaults import SEED
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
 from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
 from designer.base.manifest import Stages
-from designer.base.plain_json import dumps
+from designer.base.plain_json import FORMAT, dumps
 from designer.base.progress import Progress, note, reported, stage, watched, whole
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
 from designer.centering.repair_branch import KINDS, kind_named, repaired
 from designer.centering.repair_measure import VerdictCache, is_rare
-from designer.centering.repair_result_json import front_csv, repair_json
 from designer.centering.repair_search import find_repair
+from designer.centering.repair_trial import Repair, Trial
 from designer.centering.repair_upgrade import Upgrades
 from designer.centering.response_windows import need_periods
 from designer.check.synthesis_result import Synthesis
@@ -40,11 +41,13 @@ from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
 from designer.model.model_file import ModelFile, errors_in, need_responses
+from designer.model.si_units import hertz_json
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from designer.answers.cure_answer import CureAnswer
+    from designer.answers.cure_answer import CureAnswer, CuredResponse, TrialRow
+    from designer.answers.shared_rows import ProvenanceRow
 
 REPAIR, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
@@ -332,3 +335,81 @@ def _checked(target: float, budget: float | None, without: Collection[str]) -> f
             raise InputError(None, "--without", name, one_of(name, names))
         kinds.add(kind)
     return frozenset(kinds)
+
+
+COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
+
+
+def repair_json(repair: Repair, provenance: ProvenanceRow, seconds: float) -> CureAnswer:
+    """Everything that was found. Prices are over the design as it is, in euro."""
+    best, file = repair.best, repair.base.modelfile
+    responses: list[CuredResponse] = [
+        {
+            "omega": r.omega,
+            **hertz_json(r.omega, file.si),
+            "b": r.b,
+            "expected": r.expected,
+            "before": before.as_dict(),
+            "after": after.as_dict(),
+            "reached": after.reached,
+            "limit": limit,
+        }
+        for r, before, after, limit in zip(
+            repair.base.model_responses,
+            repair.before.measured,
+            best.measured,
+            repair.limits,
+            strict=True,
+        )
+    ]
+    return {
+        "format": FORMAT,
+        "reached": repair.reached,
+        "why": repair.why,
+        "target": repair.target,
+        "budget": repair.budget,
+        "price": best.price,
+        "branch": best.branch,
+        "upgrades": best.upgrades.as_dict(),
+        "said": best.upgrades.in_words(file),
+        "responses": responses,
+        "rounds": [_trial(t, file) for t in repair.rounds],
+        "front": [_trial(t, file) for t in repair.front],
+        "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in repair.refused],
+        "provenance": provenance,
+        "cost": {"seconds": seconds},
+    }
+
+
+def front_csv(repair: Repair) -> str:
+    """The front of yield against price: the yield is that of the worst response."""
+    rows = []
+    for t in repair.front:
+        low, high = t.worst.interval
+        asked, rare = t.worst.counts, t.worst.rare
+        digits = 9 if is_rare(repair.target) else 5
+        rows.append(
+            {
+                "price_euro": f"{t.price:.4g}",
+                "predicted": f"{min(t.predicted):.{digits}g}",
+                "yield": f"{t.worst.rate:.{digits}g}",
+                "low": f"{low:.{digits}g}",
+                "high": f"{high:.{digits}g}",
+                "samples": str(asked.samples if rare is None else rare.boards),
+                "upgrades": "; ".join(t.upgrades.in_words(repair.base.modelfile)),
+                "failed": str(t.worst.counts.failed),
+            }
+        )
+    return csv_text(COLUMNS, rows)
+
+
+def _trial(t: Trial, file: ModelFile) -> TrialRow:
+    return {
+        "branch": t.branch,
+        "price": t.price,
+        "said": t.upgrades.in_words(file),
+        "upgrades": t.upgrades.as_dict(),
+        "predicted": list(t.predicted),
+        "measured": [m.as_dict() for m in t.measured],
+        "reached": t.reached,
+    }

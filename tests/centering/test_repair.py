@@ -42,22 +42,21 @@ from designer.centering.repair_measure import (
 )
 from designer.centering.repair_milp import cheapest
 from designer.centering.repair_plots import front_chart
-from designer.centering.repair_result_json import repair_json
 from designer.centering.repair_search import find_repair
 from designer.centering.repair_slots import PartSlot, network_slots, part_slots, trimmer_slot
-from designer.centering.repair_table import text
 from designer.centering.repair_trial import Repair, Trial
 from designer.centering.repair_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.repair_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
 from designer.jobs import fidelity_choice
 from designer.jobs.options import Options
-from designer.jobs.repair_job import FEWEST_LOST, REPAIR, STUDIES, cure, repair_into
+from designer.jobs.repair_job import FEWEST_LOST, REPAIR, STUDIES, cure, repair_into, repair_json
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
+from designer.verbs.search import repair_text
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields import stored_parts
@@ -242,7 +241,7 @@ def test_a_rare_loss_is_repaired_for_the_least_price(monkeypatch: pytest.MonkeyP
     ]
     program = seen.program({(0, 0, 0): 1.0}, {})
     assert found.best.price == pytest.approx(min(program.price((*p, 0)) for p in enough))
-    assert "of a million lost" in text(repair_json(found, NO_ORIGIN, 0.0))
+    assert "of a million lost" in repair_text(repair_json(found, NO_ORIGIN, 0.0))
 
 
 @pytest.mark.slow
@@ -258,7 +257,7 @@ def test_the_cheapest_repair_is_the_enumerated_one(
     assert found.best.price == pytest.approx(by_hand(real))
     worst = [t.worst.rate for t in found.front]
     assert worst == sorted(worst)
-    told = text(repair_json(found, NO_ORIGIN, 0.0))
+    told = repair_text(repair_json(found, NO_ORIGIN, 0.0))
     assert "every response at 97 % or better" in told
     assert "ω = " in told
     assert to_svg(front_chart(found)).startswith("<svg")

@@ -22,7 +22,6 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress, report_to
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.levers import DesignChoice
-from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
 from designer.jobs import fidelity_choice, search_job
@@ -30,7 +29,7 @@ from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.repair_job import CureResult
 from designer.jobs.search_job import confirms, search_into, to_confirm
-from designer.jobs.search_stage import searched_into
+from designer.jobs.search_stage import resolved, searched_into
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.verbs.search import KINDS
