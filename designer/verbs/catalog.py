@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, cast
 
 from designer.base.progress import Progress, reported, stage
 from designer.base.units import format_quantity
@@ -12,6 +12,7 @@ from designer.verbs.console import say, table
 from designer.verbs.declared import Verb, option
 
 if TYPE_CHECKING:
+    from designer.answers.catalog_answer import CatalogNames, FigureCheckRow, OpAmpChecks
     from designer.catalog.parts_catalog import Catalog
     from designer.spice.opamp_check import FigureCheck
 
@@ -34,12 +35,17 @@ class CatalogAnswer:
     """Its figures, by the catalogue and by its model in ngspice."""
 
     @property
-    def answer(self) -> Mapping[str, Any]:
+    def answer(self) -> CatalogNames | OpAmpChecks:
         """The JSON object (docs/contract.md)."""
-        names = {kind: [entry.name for entry in getattr(self.entries, kind)] for kind in KINDS}
-        rows = [{**asdict(figure), "agrees": figure.agrees} for figure in self.figures]
-        found = names if self.opamp is None else {"opamp": self.opamp, "checks": rows}
-        return {"format": 1, **found, "hash": self.entries.hash}
+        own = self.entries.hash
+        if self.opamp is None:
+            names = {kind: [entry.name for entry in getattr(self.entries, kind)] for kind in KINDS}
+            return cast("CatalogNames", {"format": 1, **names, "hash": own})
+        rows = [
+            cast("FigureCheckRow", {**asdict(figure), "agrees": figure.agrees})
+            for figure in self.figures
+        ]
+        return {"format": 1, "opamp": self.opamp, "checks": rows, "hash": own}
 
 
 @reported
