@@ -86,11 +86,11 @@ def questions_of(synthesis: Synthesis, responses: Sequence[ModelResponse]) -> li
     ]
 
 
-def plan_of(synthesis: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
+def plan_of(synthesis: Synthesis, question: Question, seed: int) -> StudyPlan:
     """The study of one response of a design, boards as its model file says."""
     circuit = synthesis.design.circuit
     spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)
-    return StudyPlan(circuit, spread, seed, samples, (question,))
+    return StudyPlan(circuit, spread, seed, MOST, (question,))
 
 
 class VerdictCache:
