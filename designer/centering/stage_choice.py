@@ -48,7 +48,6 @@ class StageForecast:
     """What is foretold of a design with one of the stages."""
 
     synthesis: Synthesis
-    """The design."""
     kept: int | None
     """Of ``BOARDS`` boards, those that keep the response that the fewest keep; None without a
     response that the model shows with a period."""

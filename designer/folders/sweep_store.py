@@ -104,7 +104,6 @@ class Blocks(Generic[Kept]):
     codec: ParquetCodec
     """How a block is written."""
     rows: Callable[[Kept, Place], Rows]
-    """The rows of a block."""
     make: Callable[[Rows, Place], Kept]
     """The block of these rows, as of ``KeyedStore.read_as``."""
     words: tuple[str, ...] = ("block",)

@@ -47,7 +47,6 @@ class BenchedRecord:
     """A record, and what it shows."""
 
     path: Path
-    """The file."""
     named: NamedMotion
     """What it shows."""
     overlay: Overlay | None

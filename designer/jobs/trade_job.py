@@ -52,7 +52,6 @@ class TradeExtent:
     levels: tuple[tuple[float, float], ...] = LEVELS
     """Levels of ngspice's steps."""
     rounds: int = ROUNDS
-    """Rounds of timing."""
     truth: Truths = TOP
     """What stands for the board: our full op-amps, or the vendor's macromodel."""
 
