@@ -24,7 +24,7 @@ from designer.catalog.parts_catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
-from designer.paper.report_files import make_report, write_files
+from designer.paper.report_files import write_files
 from designer.plots import system_drawing
 from designer.plots.system_equations import equations_of, number_of
 from reports.makers import (
@@ -43,6 +43,7 @@ from reports.makers import (
 from reports.makers.board_part import board_part
 from reports.makers.evidence import Evidence, Example, figure_block
 from reports.makers.frequency_sweep import frequency_sweep
+from reports.makers.make_report import make_report
 
 FORMAT = 1
 SAMPLES, SEED = 100, 71

@@ -40,7 +40,7 @@ from designer.jobs.search_stage import RULES as SEARCH_RULES
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
-from designer.paper.report_files import README, make_report, write_files
+from designer.paper.report_files import README, write_files
 from designer.paper.reproduce_tolerance import TITLES, cases
 from designer.report import comparison
 from designer.verbs.search import VERB
@@ -52,6 +52,7 @@ from designer.yields.study import Study
 from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.yield_count import Yield, all_on_one, count
+from reports.makers.make_report import make_report
 from reports.makers.robust_design_page import lever_chart, robust_design_page, yield_chart
 
 FORMAT = 1
