@@ -186,7 +186,7 @@ def repair_into(
             )
         _find_and_write(folder, stages, base, target, budget, unwanted, options)
     answer: CureAnswer = folder.json(REPAIR)
-    renew_report(folder, note)
+    renew_report(folder)
     if out is not None:
         _write_design(base, answer, out, options)
     return CureResult(answer, bool(answer["reached"]), not todo)

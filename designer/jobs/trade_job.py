@@ -155,7 +155,7 @@ def answer(
     inputs = {**runner.design_inputs, **asdict(extent), "levels": levels, "seed": options.seed}
     inputs |= {"rules": RULES, **grade_inputs(modelfile, runner.catalog)}
     if not runner.decide({"trade": (inputs, [*NAMES, PIECES])}):
-        renew_report(folder, progress.note)
+        renew_report(folder)
         return folder.json(TRADE), True
     key = ManifestStage(inputs).hash
     unfinished = folder.state("trade", inputs) == "unfinished"
@@ -173,7 +173,7 @@ def answer(
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)
     folder.finish("trade")
-    renew_report(folder, progress.note)
+    renew_report(folder)
     return folder.json(TRADE), False
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from designer.base.defaults import cores
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.progress import Progress, note, reported, stage, watched
+from designer.base.progress import Progress, reported, stage, watched
 from designer.verbs.console import answering, say, table
 from designer.verbs.declared import DesignDir, Jobs, Overwrite, Verb, option
 from designer.verbs.tables import YES_NO, drive_cells, files as written
@@ -212,7 +212,7 @@ def bench(
     if lists:
         bench_job.put(place / bench_job.LIST, measured_list(fits, bench_job.LISTED).encode("utf-8"))
     if place.resolve().is_relative_to(path.resolve()):
-        renew_report(Folder(path), note)
+        renew_report(Folder(path))
     if ngspice and any(each.overlay is not None for each in benched):
         stage("ngspice")
         answered = result(bench_job.with_ngspice(benched, prediction, jobs or cores()))

@@ -134,7 +134,7 @@ def rules(
     try:
         with place.working(stages):
             place.write(NAME, dumps(answer))
-        renew_report(place, note)
+        renew_report(place)
     except NotWritten as why:
         note(f"the answer is not stored: {why}")
         answer["not_stored"] = str(why)
