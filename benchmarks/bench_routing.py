@@ -30,7 +30,7 @@ from designer.catalog.fab import fab_limits
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import on_board
 from designer.fabrication import kicad_plot
-from designer.fabrication.order_check import check_order
+from designer.fabrication.order import check_order
 from designer.fabrication.plotted_copper import plotted
 from designer.folders import board_files
 from designer.folders.kicad_files import texts

@@ -244,17 +244,13 @@ def sealed_line(values: Iterable[Any]) -> str:
     return sealed(json.dumps([*values, BLANK], allow_nan=False).encode("ascii")).decode("ascii")
 
 
-def read_line(line: bytes) -> list[Any]:
-    """The values of a sealed line, without the seal.
-
-    Raises
-    ------
-    ValueError, InputError : it is damaged or none.
-    """
-    values = _checked(line)
-    if not isinstance(values, list):
-        raise ValueError("no list")
-    return values[:-1]
+def read_line(line: bytes) -> list[Any] | None:
+    """The values of a sealed line, without the seal; None where it is damaged or none."""
+    try:
+        values = _checked(line)
+    except (*UNREADABLE, InputError):
+        return None
+    return values[:-1] if isinstance(values, list) else None
 
 
 def _checked(line: bytes) -> Any:

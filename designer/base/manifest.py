@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from designer.base.defaults import DIALECTS, Dialect
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes
-from designer.base.seal import sha256
+from designer.base.seal import json_hash, sha256
 from designer.base.version import __version__
 
 FORMAT = 1
@@ -85,7 +85,7 @@ class ManifestStage:
 
     @property
     def hash(self) -> str:
-        return sha256(json.dumps(self.inputs, sort_keys=True).encode("ascii"))
+        return json_hash(self.inputs)
 
 
 @dataclass
@@ -160,8 +160,7 @@ def file_hash(name: str, content: bytes) -> str:
 
 def object_hash(value: Mapping[str, Any]) -> str:
     """Hash of the object of a JSON file as the manifest states it."""
-    rest = {key: part for key, part in value.items() if key != "cost"}
-    return sha256(json.dumps(rest, sort_keys=True).encode("ascii"))
+    return json_hash({key: part for key, part in value.items() if key != "cost"})
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -4,31 +4,34 @@ On a terminal a bar for each stage, with rate and time left; elsewhere a line fo
 more from time to time while it lasts; with ``-q`` nothing. Time left is said from a tenth of a
 stage on: the longest steps often come first, and the first of all may wait for a compiler.
 
-No stage is silent: whoever is watched (``with progress:``) says every `SILENCE` seconds how long
-the stage has lasted, how far it is, and what it works on just now, if nothing else was said. What
-is worked on comes from `doing` and `part`, which any function may call: they reach who is watched,
-or nobody, and so do `note` and `best_so_far`. What is sought (``with seeking:``) is told a minute
-after the search began, as good as it is known then, and each minute from there on. A work of
-several stages (``with progress.whole(…):``) says beside each of them how far the whole is. The same
+Any function may call `stage`, `note`, `doing`, `part` and the other functions of this module: they
+reach whom a verb was given to tell (`reported`). No stage is silent: inside ``with progress:`` that
+one says every `SILENCE` seconds how long the stage has lasted, how far it is, and what it works on
+just now (`doing`, `part`), if nothing else was said. What is sought (``with seeking:``) is
+told a minute after the search began, as good as it is known then, and each minute from there on. A
+work of several stages (``with whole(…):``) says beside each of them how far the whole is. The same
 lines stand in the log.
 """
 
 from __future__ import annotations
 
+import functools
 import logging
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar, Token
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ParamSpec, Self, TypeVar
 
 from designer.base.printed import printable, tell
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID
 
+P = ParamSpec("P")
+Result = TypeVar("Result")
 Show = Callable[[Any], None]
 """Takes an answer while the work goes on: of a design once its parts stand, of a study once the
 yields of the exact circuit stand, where ngspice is asked after that, and once all yields stand,
@@ -299,16 +302,67 @@ class Progress:
 
 
 _WATCHED: ContextVar[Progress | None] = ContextVar("watched", default=None)
-"""Who is told by `doing`, `part`, `note`, `seeking` and `best_so_far`."""
+"""Who is told."""
 _PARTS: ContextVar[tuple[str, ...]] = ContextVar("parts", default=())
 """The parts of the work that are under way, the outermost first; a thread beside has its own."""
 
 
+@contextmanager
+def report_to(progress: Progress | None) -> Iterator[None]:
+    """Inside, this one is told of the work; None: whoever is told already."""
+    if progress is None:
+        yield
+        return
+    token = _WATCHED.set(progress)
+    try:
+        yield
+    finally:
+        _WATCHED.reset(token)
+
+
+def reported(function: Callable[P, Result]) -> Callable[P, Result]:
+    """The function, which tells of its work whom its keyword ``progress`` names (`report_to`)."""
+
+    @functools.wraps(function)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> Result:
+        progress = kwargs.get("progress")
+        assert progress is None or isinstance(progress, Progress)
+        with report_to(progress):
+            return function(*args, **kwargs)
+
+    return wrapped
+
+
+def is_watched() -> bool:
+    """Whether there is somebody to tell."""
+    return _WATCHED.get() is not None
+
+
+def watched() -> Progress:
+    """Who is watched; where nobody is, one that tells the log alone. Threads beside ask before they
+    begin."""
+    return _WATCHED.get() or Progress()
+
+
+def stage(text: str, total: int | None = None) -> Callable[[], None]:
+    """As of ``Progress.stage``."""
+    return watched().stage(text, total)
+
+
+def whole(usual: Mapping[str, float]) -> AbstractContextManager[None]:
+    """As of ``Progress.whole``."""
+    return watched().whole(usual)
+
+
+def note(text: str) -> None:
+    """As of ``Progress.note``."""
+    watched().note(text)
+
+
 def doing(text: str) -> None:
     """Tell who is watched what is worked on just now, such as "dead zone, tables 3"."""
-    watched = _WATCHED.get()
-    if watched is not None:
-        watched.doing(text)
+    if (told := _WATCHED.get()) is not None:
+        told.doing(text)
 
 
 @contextmanager
@@ -325,13 +379,6 @@ def part(text: str) -> Iterator[None]:
     finally:
         _PARTS.reset(above)
         watched.forget_parts()
-
-
-def note(text: str) -> None:
-    """Tell who is watched something that a user ought to know."""
-    watched = _WATCHED.get()
-    if watched is not None:
-        watched.note(text)
 
 
 @contextmanager
@@ -352,9 +399,8 @@ def seeking(what: str) -> Iterator[None]:
 def best_so_far(text: str, *, step: bool = False) -> None:
     """Tell who is watched the best that is known of what is sought, such as "an error of 1 %".
     step : as of ``Progress.best_so_far``."""
-    watched = _WATCHED.get()
-    if watched is not None:
-        watched.best_so_far(text, step=step)
+    if (told := _WATCHED.get()) is not None:
+        told.best_so_far(text, step=step)
 
 
 class ProgressLines(Progress):

@@ -7,6 +7,8 @@ text. ``sealed`` puts the digest of everything, with the blank still in it, in i
 from __future__ import annotations
 
 import hashlib
+import json
+from typing import Any
 
 MARK = "designer-sha256:"
 DIGITS = 64
@@ -16,6 +18,11 @@ BLANK = MARK + "0" * DIGITS
 def sha256(content: bytes) -> str:
     """The hash of some bytes, in hexadecimal."""
     return hashlib.sha256(content).hexdigest()
+
+
+def json_hash(value: Any) -> str:
+    """The hash of JSON data, in whatever order its keys are."""
+    return sha256(json.dumps(value, sort_keys=True).encode("ascii"))
 
 
 def sealed(content: bytes) -> bytes:

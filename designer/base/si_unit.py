@@ -108,9 +108,9 @@ def span_text(low: float, high: float, unit: str, si: Unit | None = None) -> str
     return plain if si is None else f"{plain} ({si.text(low)} to {si.text(high)})"
 
 
-def acceleration_text(value: float, digits: int = DIGITS) -> str:
+def acceleration_text(value: float) -> str:
     """An acceleration in m/s² for people: "3.2 m/s² (0.3263 g)"."""
-    return f"{value:.{digits}g} m/s² ({value / ACCELERATIONS['g']:.{digits}g} g)"
+    return f"{value:.{DIGITS}g} m/s² ({value / ACCELERATIONS['g']:.{DIGITS}g} g)"
 
 
 def value_text(value: float, unit: str, digits: int = DIGITS) -> str:

@@ -54,7 +54,6 @@ class CurveOrigin:
     curve: int
     """Number of the curve that it was found on, from 1."""
     name: str
-    """Name of the point."""
     values: tuple[float, float]
     """Values of both parameters."""
 

@@ -65,7 +65,6 @@ class BranchPoint:
     """An orbit on a branch."""
 
     value: float
-    """Value of the parameter."""
     orbit: Orbit
     solved: Solved
     """Where on its curve it lies."""

@@ -94,7 +94,6 @@ class Bifurcation:
     value: float
     """Value of the parameter at the point."""
     kind: PointKind
-    """Kind of the point; see ``PointKind``."""
     error: float
     """Half the width of an interval of the parameter that was seen to hold the point: the test
     function has different signs (for grazing: the counts of impacts differ) at its ends."""

@@ -25,7 +25,6 @@ class WindowEnd:
     """An end of a window."""
 
     value: float
-    """Value of the parameter."""
     error: float
     """Half the width of the interval of the parameter that holds the end."""
     why: str

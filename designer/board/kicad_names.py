@@ -75,7 +75,7 @@ def footprint_name(footprint: str) -> str:
     return library_name(footprint.rpartition(":")[2])
 
 
-def safe_text(text: str, longest: int = 120) -> str:
+def safe_text(text: str) -> str:
     """A foreign text for a title block: printable, one line, no variable that KiCad expands."""
     flat = " ".join("".join(ch if ch.isprintable() else " " for ch in text).split())
-    return flat.replace("${", "$ {").replace("@{", "@ {")[:longest].rstrip()
+    return flat.replace("${", "$ {").replace("@{", "@ {")[:120].rstrip()

@@ -7,17 +7,16 @@ short is left out, and so is a line that was damaged, which is said.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from designer.base.atomic_write import write
 from designer.base.errors import InputError
-from designer.base.guarded_reading import UNREADABLE, read_bytes
+from designer.base.guarded_reading import read_bytes
 from designer.base.keyed_store import DAMAGED, UNSEALED, Note, read_line, sealed_line
 from designer.base.progress import quiet
+from designer.base.seal import json_hash
 
 FORMAT = 2
 
@@ -66,7 +65,7 @@ class AnswerCache:
         expected = "candidates of a search"
         content = read_bytes(path, expected) if path.exists() else b""
         first, *rest = content.split(b"\n")
-        head = _values(first)
+        head = read_line(first)
         before = first.startswith(b'{"format": 1, ')
         if before:
             self._note(f"{path}: {UNSEALED}")
@@ -110,25 +109,13 @@ def _may_be(answer: tuple[int, ...] | None, most: Sequence[int]) -> bool:
     return all(0 <= value <= limit for value, limit in zip(answer, most, strict=True))
 
 
-def _values(line: bytes) -> list[Any] | None:
-    """The values of a line; None where it is damaged."""
-    try:
-        return read_line(line)
-    except (*UNREADABLE, InputError):
-        return None
-
-
 def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
     """Key and answer of a line; None where it is damaged."""
-    try:
-        key, ok = read_line(line)
-        if not all(type(v) is int for v in ok):
-            raise TypeError("a number of boards that is none")
-        return str(key), tuple(ok)
-    except (*UNREADABLE, InputError):
-        return None
+    match read_line(line):
+        case [str(key), [*ok]] if all(type(v) is int for v in ok):
+            return key, tuple(ok)
+    return None
 
 
 def _key(search: str, query: Any) -> str:
-    text = json.dumps([search, query], sort_keys=True)
-    return hashlib.sha256(text.encode("ascii")).hexdigest()[:24]
+    return json_hash([search, query])[:24]

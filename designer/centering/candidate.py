@@ -31,7 +31,6 @@ class Candidate:
     choice: DesignChoice
     """How the design is made."""
     design: Design
-    """The finished design."""
     model_responses: tuple[ModelResponse, ...]
     """The design's responses at their operating points, and what the model shows there."""
     scored: tuple[Scored, ...]
@@ -59,7 +58,6 @@ class Step:
     """A lever that was tried."""
 
     lever: str
-    """Name of the lever."""
     setting: str
     """Setting that the lever was put to."""
     rank: tuple[float, float] | None
@@ -75,7 +73,6 @@ class Contribution:
     """What a lever is worth."""
 
     lever: str
-    """Name of the lever."""
     start: str
     """Its setting in the match design."""
     final: str
@@ -132,7 +129,6 @@ class SearchResult:
     places: int
     """Number of operating points at which boards were simulated."""
     seed: int
-    """Seed of the boards."""
 
 
 def better(rank: tuple[float, float], than: tuple[float, float]) -> bool:

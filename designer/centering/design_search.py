@@ -19,8 +19,9 @@ from dataclasses import replace
 
 from scipy.special import ndtr
 
+from designer.base import progress
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import Progress, doing, part, seeking
+from designer.base.progress import doing, part, seeking
 from designer.board.board_check import check_board
 from designer.catalog.parts_catalog import Catalog
 from designer.centering.answer_cache import AnswerCache
@@ -69,7 +70,6 @@ def search(
     memory: AnswerCache | None = None,
     windows: Sequence[tuple[Stretch, ...]] | None = None,
     ask_agreement: AskAgreement | None = None,
-    progress: Progress | None = None,
 ) -> SearchResult:
     """Seek the design and the places of the highest predicted yield.
 
@@ -84,12 +84,9 @@ def search(
         does not show a response.
     Unreachable : no design keeps its conditions and the match error.
     """
-    progress = Progress() if progress is None else progress
     catalog = modelfile.choices(catalog)
     with errors_in(modelfile):
-        all_windows = (
-            look(modelfile, catalog, jobs, progress) if windows is None else tuple(windows)
-        )
+        all_windows = look(modelfile, catalog, jobs) if windows is None else tuple(windows)
         design_search = _DesignSearch(
             modelfile,
             catalog,
@@ -98,15 +95,12 @@ def search(
             jobs,
             AnswerCache() if memory is None else memory,
             ask_agreement,
-            progress,
         )
         with seeking("design"):
             return design_search.run()
 
 
-def look(
-    modelfile: ModelFile, catalog: Catalog, jobs: int, progress: Progress
-) -> tuple[tuple[Stretch, ...], ...]:
+def look(modelfile: ModelFile, catalog: Catalog, jobs: int) -> tuple[tuple[Stretch, ...], ...]:
     """Refuse everything that may be refused, and say where the model shows each response.
 
     Raises
@@ -157,10 +151,9 @@ class _DesignSearch:
         jobs: int,
         memory: AnswerCache,
         ask_agreement: AskAgreement | None,
-        progress: Progress,
     ) -> None:
         self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
-        self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
+        self.seed, self.jobs, self.memory = seed, jobs, memory
         self.ask_agreement, self.checks = ask_agreement, list[FidelityOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
@@ -182,7 +175,7 @@ class _DesignSearch:
             self._there(spec, [s.at((0.5,))[0] for s in window])
             for spec, window in zip(self.modelfile.responses, self.windows, strict=True)
         )
-        self._step = self.progress.stage("designs", self._most_designs)
+        self._step = progress.stage("designs", self._most_designs)
         start, best = self._topology(middle)
         if any(open_in(spec) for spec in self.modelfile.responses):
             best = self._placed(best)
@@ -298,7 +291,7 @@ class _DesignSearch:
         low, _ = self.modelfile.circuit.frequency
         for choice in slower(best.choice, self._frequency(best), low):
             setting = _setting_text(choice.frequency)
-            self._step = self.progress.stage("slower designs")
+            self._step = progress.stage("slower designs")
             candidate = self._candidate(choice, best.model_responses, f"time scale {setting}")
             if candidate is None:
                 self._note("time scale", setting, None, False)
@@ -324,12 +317,12 @@ class _DesignSearch:
         frequency = self._frequency(candidate)
         engine = "exact circuit with" if fidelity == BANDWIDTH else "ngspice, rung"
         title = f"{engine} {fidelity}, {self._time_scale(frequency)}"
-        step = self.progress.stage(title, len(candidate.scored))
+        step = progress.stage(title, len(candidate.scored))
         responses, design = candidate.model_responses, candidate.design
         bench = self._bench(candidate.choice, responses, design, BOARDS_ASKED)
         agreements = ask_agreement(bench, [s.operating_orbit for s in candidate.scored], step)
         text = ", ".join(map(str, agreements))
-        self.progress.note(f"  {title}: boards that show it as well, by response: {text}")
+        progress.note(f"  {title}: boards that show it as well, by response: {text}")
         return candidate, FidelityOutcome(fidelity, frequency, agreements)
 
     def _bench(
@@ -383,7 +376,7 @@ class _DesignSearch:
             return ()
         moved = [lv for lv in LEVERS if start.choice.get(lv) != final.choice.get(lv)]
         number = 2 * (len(moved) + (final.wanted != start.wanted))
-        self._step = self.progress.stage("what each lever is worth", number)
+        self._step = progress.stage("what each lever is worth", number)
         out = []
         if final.wanted != start.wanted:
             out.append(
@@ -448,7 +441,7 @@ class _DesignSearch:
 
     def _synthesis(self, best: Candidate) -> Synthesis:
         """The final design with its certificate whole: what each condition costs included."""
-        self.progress.stage("the design that was found, what its conditions cost")
+        progress.stage("the design that was found, what its conditions cost")
         model, spec = self.modelfile.model, best.choice.spec(self.modelfile.circuit)
         responses = best.model_responses
         model_peaks = find_responses.peaks(model, responses)
@@ -466,9 +459,9 @@ class _DesignSearch:
         if candidate is not None:
             worst = float(ndtr(candidate.rank[0]))
             text = f"smallest distance {candidate.rank[0]:.2f} σ (predicted yield {worst:.4f})"
-            self.progress.note(f"  {lever}: {setting}: {text}{', kept' if adopted else ''}")
+            progress.note(f"  {lever}: {setting}: {text}{', kept' if adopted else ''}")
             if adopted:
-                self.progress.best_so_far(f"{text}, with {lever} {setting}")
+                progress.best_so_far(f"{text}, with {lever} {setting}")
 
 
 def _most_surviving(asked: Sequence[tuple[Candidate, FidelityOutcome]]) -> Candidate:

@@ -154,7 +154,6 @@ class LinearModel:
     trim: float
     """Half-width of the band of the DC offset, over the amplitude."""
     seed: int
-    """Seed of the boards."""
     matched: Mapping[tuple[int, int], Array] = field(default_factory=dict)
     """By slot and option of an array, the covariance (n, n) of its elements, in the same units."""
     _drawn: dict[tuple[int, ...], Boards] = field(default_factory=dict, repr=False, compare=False)

@@ -5,16 +5,18 @@ yield is. Where so few may be lost that counting does not tell, they are drawn w
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import bdtrc
 
+from designer.base.guarded_reading import UNREADABLE
 from designer.base.plain_json import plain
 from designer.base.progress import doing
 from designer.base.proportion import TAIL, mid_p
+from designer.base.record_check import read_record
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
@@ -84,11 +86,11 @@ def questions_of(synthesis: Synthesis, responses: Sequence[ModelResponse]) -> li
     ]
 
 
-def plan_of(synthesis: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
+def plan_of(synthesis: Synthesis, question: Question, seed: int) -> StudyPlan:
     """The study of one response of a design, boards as its model file says."""
     circuit = synthesis.design.circuit
     spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)
-    return StudyPlan(circuit, spread, seed, samples, (question,))
+    return StudyPlan(circuit, spread, seed, MOST, (question,))
 
 
 class VerdictCache:
@@ -167,29 +169,23 @@ class _EstimateParts(StoredParts):
 
     def get(self, name: str) -> GivenAnswers | None:
         stored = self._study.get(name)
-        return None if stored is None else GivenAnswers(**stored)
+        return None if stored is None else read_record(GivenAnswers, stored)
 
     def put(self, values: Mapping[str, Any]) -> None:
         self._study.update({name: asdict(answers) for name, answers in values.items()})
         self._save()
 
 
-def _is_stored(place: str, found: object) -> bool:
-    if place == _ANSWERS:
-        names = {field.name for field in fields(GivenAnswers)}
-        return (
-            isinstance(found, Mapping)
-            and set(found) == names
-            and all(isinstance(texts, list) for texts in found.values())
-            and all(isinstance(text, str) for texts in found.values() for text in texts)
-        )
-    if place == _RARE:
-        names = {field.name for field in fields(RareShare)}
-        numbers = isinstance(found, Mapping) and all(
-            isinstance(value, int | float) and 0.0 <= value < float("inf")
-            for value in found.values()
-        )
-        return numbers and isinstance(found, Mapping) and set(found) == names
+def _is_stored(place: str, found: Any) -> bool:
+    try:
+        if place == _ANSWERS:
+            read_record(GivenAnswers, found)
+            return True
+        if place == _RARE:
+            share = read_record(RareShare, found)
+            return all(0.0 <= value < float("inf") for value in astuple(share))
+    except UNREADABLE:
+        return False
     return isinstance(found, str) and set(found) <= set(_LETTERS.values())
 
 

@@ -17,8 +17,9 @@ from functools import partial
 import numpy as np
 
 from designer.answers.rare_words import boards_text
+from designer.base import progress
 from designer.base.defaults import cores
-from designer.base.progress import Progress, best_so_far, seeking
+from designer.base.progress import best_so_far, seeking
 from designer.centering.limiting_parts import joint_boards, limiting
 from designer.centering.repair_branch import TRIM, TRIMMER, Refused, RepairBranch, branches
 from designer.centering.repair_couplings import finest
@@ -78,7 +79,6 @@ def find_repair(
     seed: int = 1,
     jobs: int | None = None,
     verdict_cache: VerdictCache | None = None,
-    progress: Progress | None = None,
 ) -> Repair:
     """Search, in memory.
 
@@ -93,12 +93,11 @@ def find_repair(
     InputError : the model file names no response, or a place of a response is no choice.
     """
     need_responses(base.modelfile)
-    progress = Progress() if progress is None else progress
     verdict_cache = VerdictCache() if verdict_cache is None else verdict_cache
     threads = cores() if jobs is None else jobs
     if is_rare(target):
         without, trim = without | {TRIM, TRIMMER}, 0.0
-    search = _Search(base, target, budget, trim, without, seed, threads, verdict_cache, progress)
+    search = _Search(base, target, budget, trim, without, seed, threads, verdict_cache)
     with seeking("cure"):
         return search.run()
 
@@ -114,11 +113,10 @@ class _Search:
         seed: int,
         jobs: int,
         verdict_cache: VerdictCache,
-        progress: Progress,
     ) -> None:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
         self.without, self.seed, self.jobs = without, seed, jobs
-        self.verdict_cache, self.progress = verdict_cache, progress
+        self.verdict_cache = verdict_cache
         self.waiting = branches(base, without)
         self.known: list[RepairBranch] = []
         self.pictures: list[LinearModel] = []
@@ -178,7 +176,7 @@ class _Search:
         pairs = list(zip(one.measured, other.measured, strict=True))
         for r, (a, b) in enumerate(pairs, start=1):
             if max(a.interval[0], b.interval[0]) > min(a.interval[1], b.interval[1]):
-                self.progress.note(
+                progress.note(
                     f"  response {r}: the two estimates differ by more than their intervals, as "
                     "where one of them alone met a region of losses; the worse one counts"
                 )
@@ -190,7 +188,7 @@ class _Search:
         self, study: int, name: str, boards: int | None = None, *, whole: bool = False
     ) -> Trial:
         """The design as it is, on fresh boards. Arguments : as of ``_trial``."""
-        step = self.progress.stage(name.replace("as it is", "the design as it is", 1))
+        step = progress.stage(name.replace("as it is", "the design as it is", 1))
         synthesis, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
         self.unseen.clear()
         for number, question in enumerate(questions_of(synthesis, synthesis.model_responses)):
@@ -230,7 +228,7 @@ class _Search:
     def _reported(self, name: str, trial: Trial) -> Trial:
         """The trial, once its yields are said and the best of all so far is known."""
         shares = ", ".join(_share(m) for m in trial.measured)
-        self.progress.note(f"  {name}: yield of each response: {shares}")
+        progress.note(f"  {name}: yield of each response: {shares}")
         if self.best is None or trial.worst.rate > self.best.worst.rate:
             self.best = trial
             what = ", ".join(trial.upgrades.in_words(self.base.modelfile)) or "as it is"
@@ -246,8 +244,8 @@ class _Search:
         for which in range(len(self.pictures)):
             best = self._better(best, which, target)
         while (branch := self._next_branch(None if best is None else best[0])) is not None:
-            self.progress.stage(f"margins, {branch.name}")
-            step = self.progress.stage(f"linear picture, {branch.name}")
+            progress.stage(f"margins, {branch.name}")
+            step = progress.stage(f"linear picture, {branch.name}")
             measured = self.before.measured if branch.upgrades == Upgrades() else ()
             model = picture(
                 branch,
@@ -282,7 +280,7 @@ class _Search:
         if least is not None and least <= 0.0:
             return None
         for branch in self.waiting:
-            self.progress.stage("other op-amps and dead zones")
+            progress.stage("other op-amps and dead zones")
             if isinstance(branch, Refused):
                 self.refused.append(branch)
             else:
@@ -372,7 +370,7 @@ class _Search:
         responses reach the target. whole : as ``measure_all`` has it."""
         model = self.pictures[which]
         cost = self._price(which, pick)
-        step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
+        step = progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = model.upgrades(pick)
         circuit, spread = model.spread(pick)
         seed = study_seed(self.seed, number)
@@ -401,7 +399,7 @@ class _Search:
                 continue
             w = pick[len(model.parts) + r]
             if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
-                step = self.progress.stage(f"linear picture, {model.branch.name}: response {r + 1}")
+                step = progress.stage(f"linear picture, {model.branch.name}: response {r + 1}")
                 model = pictured(model, [(r, w)], self.target, self.jobs, step)
                 self.pictures[which] = model
                 way = model.ways[r][w]

@@ -16,7 +16,6 @@ class Trial:
     """A choice of upgrades, what was promised and what fresh boards show."""
 
     branch: str
-    """Name of the branch."""
     upgrades: Upgrades
     """Upgrades that were chosen."""
     price: float

@@ -53,7 +53,6 @@ class PartNetwork:
     family: str
     """Family of the catalogue's arrays."""
     parts: tuple[str, ...]
-    """Names of the parts."""
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,6 @@ class ResponseSurvey:
     target: float
     """Yield that is wanted of every response."""
     seed: int
-    """Seed of the boards."""
     verdict_cache: VerdictCache
     """Keeps what has been computed."""
     trim: float

@@ -81,7 +81,6 @@ class OperatingOrbit:
     """The nominal board's orbit at an operating point, which boards start from."""
 
     spec: Response
-    """The wanted response."""
     place: OperatingPoint
     """Where it is asked for."""
     drive: Drive

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import doing, note, part
+from designer.base.progress import doing, is_watched, note, part
 from designer.base.second_process import Ask
 from designer.catalog.design_rule import FAIL
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -48,7 +48,6 @@ class StageForecast:
     """What is foretold of a design with one of the stages."""
 
     synthesis: Synthesis
-    """The design."""
     kept: int | None
     """Of ``BOARDS`` boards, those that keep the response that the fewest keep; None without a
     response that the model shows with a period."""
@@ -131,7 +130,8 @@ def synthesise(
     if refusal is not None and not forecasts:
         raise refusal
     made = replace(chosen(forecasts), seconds=time.perf_counter() - began)
-    note(synthesis_result.parts_line(made.design, made.seconds))
+    if is_watched():
+        note(synthesis_result.parts_line(made.design, made.seconds))
     return made
 
 

@@ -32,7 +32,6 @@ class FirstRun:
     excitation: Excitation
     """The generator's setting."""
     settings: SolverSettings
-    """Settings of ngspice."""
     stop_time: float
     """End of the run [s]."""
     initial: Array | None

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from designer.base import progress
 from designer.base.arrays import Array
 from designer.base.defaults import DRAWN_STARTS, SEED, Fidelity, cores
 from designer.base.errors import InputError
 from designer.base.frames import table_html
-from designer.base.progress import Progress
 from designer.check import coexistence, trust
 from designer.check.absolute_motion import absolute_extremes
 from designer.check.checked_design import CheckedResponse, as_named_in_ngspice, spice_trace
@@ -192,7 +192,6 @@ def simulate(
     engine: Engine = "model",
     synthesis: Synthesis | None = None,
     jobs: int | None = None,
-    progress: Progress | None = None,
     traces: bool = False,
     fidelity: Fidelity = "ideal",
     starts: int = DRAWN_STARTS,
@@ -216,7 +215,6 @@ def simulate(
     """
     coexistence.check(starts)
     sampling = (starts, seed)
-    progress = Progress() if progress is None else progress
     if fidelity != "ideal" and engine != "ngspice":
         raise InputError(
             None, "--rung", fidelity, "ideal, or --engine ngspice: other engines have none"
@@ -242,7 +240,7 @@ def simulate(
         require_ngspice(pool)
         synthesis = synthesis or _design(modelfile, choose)
         scan = _Scan(bool(omegas), start)
-        return _in_ngspice(synthesis, specs, scan, pool, progress, traces, fidelity)
+        return _in_ngspice(synthesis, specs, scan, pool, traces, fidelity)
 
 
 def _design(modelfile: ModelFile, choose: Callable[[ModelFile], Synthesis] | None) -> Synthesis:
@@ -527,7 +525,6 @@ def _in_ngspice(
     specs: Sequence[Response],
     scan: _Scan,
     pool: SpicePool,
-    progress: Progress,
     traces: bool,
     fidelity: Fidelity,
 ) -> tuple[Simulated, ...]:

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from designer.base.frames import table_html
-from designer.base.progress import doing, note, seeking
+from designer.base.progress import doing, is_watched, note, seeking
 from designer.catalog.design_rule import RuleOutcome
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.circuit.coefficients import EXACT
@@ -102,7 +102,7 @@ def synthesise(
             def stand(design: Design) -> None:
                 spread_of(modelfile, design.circuit, catalog)  # refuses what no board of it can be
                 search.close()  # what comes is no search for parts
-                if announced:
+                if announced and is_watched():
                     note(parts_line(design, time.perf_counter() - began))
 
             design = parts_choice.synthesise(*choice, held, responses, jobs=jobs, stand=stand)

@@ -81,7 +81,6 @@ class Design:
     """A finished choice of parts."""
 
     model: MechanicalModel
-    """The wanted model."""
     circuit: Circuit
     """The circuit that was chosen."""
     errors: CoefficientErrors

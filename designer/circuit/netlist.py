@@ -45,7 +45,6 @@ class Stop:
     """How a clearance shows in the circuit."""
 
     clearance: str
-    """Its name."""
     state: str
     """Name of the capacitor whose voltage is the displacement, or of two masses the first's; of a
     dead zone of velocities that of the velocity."""

@@ -25,7 +25,6 @@ class Term:
     """One input resistor of one integrator."""
 
     resistor: str
-    """Name of the resistor."""
     state: int
     """Index of the integrator's state (x1, x1', x2, …)."""
     source: int | None

@@ -58,7 +58,6 @@ class LyapunovExponent:
     rates: Array
     """(k,) growth of the tangent vector per drive period, over ``BLOCK`` periods each."""
     period: float
-    """Period of the drive."""
     start: Array
     """(states,) the strobe that was reached."""
     mode: ModeKey

@@ -50,7 +50,6 @@ class ForceCorner:
     place: float
     """Of what the force depends on."""
     force: str
-    """Its name."""
 
     def __str__(self) -> str:
         return f"{self.force} at {self.place:.6g}"

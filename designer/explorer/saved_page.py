@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from designer.base import progress
 from designer.base.atomic_write import appearing
 from designer.base.errors import DesignerError, InputError
-from designer.base.progress import Progress
 from designer.base.si_unit import value_text
 from designer.base.threads import parallel
 from designer.bifurcations import window_ends
@@ -74,17 +74,17 @@ class RecordedYields:
     """One for each wanted response, then all of them on one board."""
 
 
-def yields(modelfile: ModelFile, options: Options, progress: Progress) -> RecordedYields:
+def yields(modelfile: ModelFile, options: Options) -> RecordedYields:
     """Parts for all wanted responses of the file, and its yields on the exact circuit."""
     if not modelfile.responses:
         return RecordedYields("the model file wants no response")
     try:
-        return _counted(modelfile, options, progress)
+        return _counted(modelfile, options)
     except DesignerError as error:
         return RecordedYields(str(error))
 
 
-def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> RecordedYields:
+def _counted(modelfile: ModelFile, options: Options) -> RecordedYields:
     progress.stage("parts for the wanted responses")
     synthesis = stage_choice.synthesise(modelfile, all_found=False, jobs=options.workers)
     design, responses = synthesis.design, synthesis.model_responses
@@ -92,7 +92,7 @@ def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> Reco
     asked = [each for each in checked if each.circuit.status in SETTLED]
     studied = modelfile, design, asked, synthesis.catalog
     plan = plan_study(*studied, samples=options.samples, seed=options.seed)
-    answers = _answers(plan, options, progress)
+    answers = _answers(plan, options)
     rows = []
     for each in checked:
         words = f"the circuit shows: {each.circuit.response}"
@@ -106,7 +106,7 @@ def _counted(modelfile: ModelFile, options: Options, progress: Progress) -> Reco
     return RecordedYields(words, tuple(rows))
 
 
-def _answers(plan: StudyPlan, options: Options, progress: Progress) -> list[Answer]:
+def _answers(plan: StudyPlan, options: Options) -> list[Answer]:
     """The answers of every board on the exact circuit."""
     step, answers = progress.stage("boards", plan.samples), []
     for indices in plan.blocks(PIECE) if plan.questions else ():
@@ -191,9 +191,7 @@ def places(modelfile: ModelFile) -> tuple[float, ...]:
     return tuple(sorted(own | set(_along(control, max(count, 2)))))
 
 
-def record(
-    modelfile: ModelFile, omegas: Sequence[float], jobs: int, progress: Progress
-) -> BranchRecording:
+def record(modelfile: ModelFile, omegas: Sequence[float], jobs: int) -> BranchRecording:
     """The places from rest, in parallel, and the windows of what they show.
 
     omegas : drive frequencies, ascending, in the model's units.
@@ -215,7 +213,7 @@ def record(
         tuple(omegas),
         tuple(view for _, view in visits),
         piece([omegas[k] for k in drawn], steps),
-        tuple(_windows(modelfile, omegas, orbits, jobs, progress)),
+        tuple(_windows(modelfile, omegas, orbits, jobs)),
     )
 
 
@@ -242,7 +240,6 @@ def _windows(
     omegas: Sequence[float],
     orbits: Sequence[Orbit],
     jobs: int,
-    progress: Progress,
 ) -> list[RecordedWindow]:
     middles = _middles(orbits)
     step = progress.stage("windows of the responses", len(middles))
@@ -302,7 +299,6 @@ def save_page(
     modelfile: ModelFile,
     path: Path,
     options: Options,
-    progress: Progress,
 ) -> None:
     """Write the page of a model with the views along ω, the windows and the yields in it: as many
     views along the slider as 3 MB have room for.
@@ -315,8 +311,8 @@ def save_page(
     options.check()
     _check_place(path, options.overwrite)
     losses = folder_losses(modelfile, progress.note)
-    branch = record(modelfile, places(modelfile), options.workers, progress)
-    counted = yields(modelfile, options, progress)
+    branch = record(modelfile, places(modelfile), options.workers)
+    counted = yields(modelfile, options)
     page = recorded_page(modelfile, message_of(branch, counted), losses)
     with appearing(path, FIELD) as partial:
         partial.write_text(page, encoding="utf-8")

@@ -77,7 +77,6 @@ class FidelityAnswer:
     level: str
     """Name of the setting, alike for all responses."""
     settings: dict[str, Any]
-    """Settings of the solver."""
     orbit: Orbit
     """Orbit in model units as far as it is used: n-p-q, status, impacts."""
     shown: Array

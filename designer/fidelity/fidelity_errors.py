@@ -60,11 +60,9 @@ class FidelityError:
 
     label: ResponseLabel
     rung: str
-    """Name of the fidelity."""
     level: str
     """Name of the setting, alike for all responses."""
     settings: Mapping[str, Any]
-    """Settings of the solver."""
     response: str
     """n-p-q or status that the fidelity shows."""
     reason: str

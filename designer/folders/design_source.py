@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MEASURED, MODEL, Folder
 from designer.base.manifest import Stages, object_hash
 from designer.base.plain_json import plain
-from designer.base.progress import Progress
+from designer.base.progress import Progress, note, report_to
 from designer.base.version import __version__
 from designer.catalog.parts_catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis
@@ -35,7 +35,8 @@ def read_design(
     modelfile, place = source(Path(path), path)
     folder, catalog = Folder(place), load_catalog() if catalog is None else catalog
     if progress is not None:
-        standing_design(folder, modelfile, catalog, progress)
+        with report_to(progress):
+            standing_design(folder, modelfile, catalog)
     return load(folder, modelfile, catalog)
 
 
@@ -79,9 +80,7 @@ def design_stage(modelfile: ModelFile, inputs: dict[str, Any]) -> Stages:
     return {"design": (inputs, files)}
 
 
-def standing_design(
-    folder: Folder, modelfile: ModelFile, catalog: Catalog, progress: Progress
-) -> Stages:
+def standing_design(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Stages:
     """The stage of the design; a design that stands in the folder is not made anew.
 
     A folder may come from another machine: where the model file is the folder's own, its parts
@@ -95,13 +94,13 @@ def standing_design(
     )
     if not stands:
         return design_stage(modelfile, inputs)
-    progress.note(
+    note(
         f"this design was made with catalogue {_short(origin, 'catalogue')} and version "
         f"{_short(origin, 'version')}; here are catalogue {_short(inputs, 'catalogue')} and "
         f"version {_short(inputs, 'version')}: its parts stand as they are"
     )
     if bills_are_of_old(origin, inputs):
-        progress.note(
+        note(
             "it is of a version whose bill of materials bought better grades than its study "
             "drew: a study that is made now writes the bill anew"
         )

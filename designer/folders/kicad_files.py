@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from designer.base import progress
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import StageName, Stages, file_hash
-from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_reader import BoardFile, read_board
@@ -54,7 +54,6 @@ def project_texts(
     synthesis: Synthesis,
     inputs: Mapping[str, Any],
     overwrite: bool,
-    progress: Progress,
 ) -> dict[str, str]:
     """Every file of the project, for a verb that writes more beside it; none where there can be no
     project.

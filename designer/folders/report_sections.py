@@ -9,10 +9,9 @@ from typing import Any
 
 from designer.base.design_folder import DESIGN, REPORTS, Folder
 from designer.base.errors import InputError
-from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, file_hash, read_json
 from designer.base.page import PageSection
-from designer.base.progress import quiet
+from designer.base.progress import note
 
 SHOWN: Mapping[StageName, Sequence[str]] = {
     "cure": ("cure.json", "cure-front.csv", "cure-front.svg"),
@@ -70,11 +69,11 @@ def _sections(folder: Folder) -> Iterator[PageSection]:
                 yield older_section(name, SHOWN[name])
 
 
-def renew_report(folder: Folder, note: Note = quiet) -> None:
+def renew_report(folder: Folder) -> None:
     """Show in the report of a folder's study what stands in the folder now; nothing is computed.
 
-    A folder without a finished study stays as it is, and so does a report that somebody changed.
-    note : told of such a report.
+    A folder without a finished study stays as it is, and so does a report that somebody changed,
+    which is said.
     """
     study = None if folder.manifest is None else folder.manifest.stages.get("study")
     if study is None or not study.complete:

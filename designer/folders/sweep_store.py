@@ -6,8 +6,6 @@ all, and one that was damaged since is not taken (``base.keyed_store``).
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +17,7 @@ from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody
 from designer.base.parquet_entry import ParquetCodec, Rows, columns_of
 from designer.base.progress import quiet
 from designer.base.record_check import Record, read_record
+from designer.base.seal import json_hash
 from designer.bifurcations.basin_shares import AttractorShare, SharePlan, Step
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.border_curve import BorderCurve, CurveMeeting, CurveOrigin, read_curve
@@ -71,8 +70,7 @@ _CURVE = [
 
 def work_hash(settings: Mapping[str, Any]) -> str:
     """Hash of what decides a result."""
-    text = json.dumps({"rules": RULES, **settings}, sort_keys=True)
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
+    return json_hash({"rules": RULES, **settings})
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,6 @@ class Blocks(Generic[Kept]):
     codec: ParquetCodec
     """How a block is written."""
     rows: Callable[[Kept, Place], Rows]
-    """The rows of a block."""
     make: Callable[[Rows, Place], Kept]
     """The block of these rows, as of ``KeyedStore.read_as``."""
     words: tuple[str, ...] = ("block",)

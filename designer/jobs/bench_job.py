@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from designer.base import progress
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import is_design_folder
 from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.plain_json import dumps, plain
 from designer.base.printed import one_line
-from designer.base.progress import Progress
 from designer.circuit.design import GeneratorSetting
 from designer.dynamics.counts import read_counts
 from designer.folders.report_sections import BENCHED as NAME
@@ -47,7 +47,6 @@ class BenchedRecord:
     """A record, and what it shows."""
 
     path: Path
-    """The file."""
     named: NamedMotion
     """What it shows."""
     overlay: Overlay | None
@@ -82,7 +81,7 @@ class BenchedRecord:
 
 
 def with_ngspice(
-    benched: Sequence[BenchedRecord], prediction: BoardPrediction, jobs: int, progress: Progress
+    benched: Sequence[BenchedRecord], prediction: BoardPrediction, jobs: int
 ) -> list[BenchedRecord]:
     """The records with ngspice's motion of the fitted board, or of the nominal one, over each."""
     out, runs, which = list(benched), [], []
@@ -166,7 +165,6 @@ def fitted_boards(
     prediction: BoardPrediction,
     *,
     several: bool,
-    progress: Progress,
 ) -> dict[str, FittedBoard]:
     """The boards behind the records by name, each fitted to all of its own.
 

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 
+from designer.base import progress
 from designer.base.arrays import Array
 from designer.base.design_folder import Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress
 from designer.base.si_unit import Unit
 from designer.base.version import __version__
 from designer.bifurcations import (
@@ -126,10 +126,8 @@ def _computed(
 class BifurcationWork:
     """What is to be computed, and what decides it."""
 
-    def __init__(
-        self, request: Request, plan: Plan, modelfile: ModelFile, jobs: int, progress: Progress
-    ) -> None:
-        self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
+    def __init__(self, request: Request, plan: Plan, modelfile: ModelFile, jobs: int) -> None:
+        self.request, self.plan, self.jobs = request, plan, jobs
         self.title = modelfile.title
         self.made: Computed | None = None
         self.folder: Folder | None = None
@@ -169,7 +167,7 @@ class BifurcationWork:
             over = titles.taken(plan.subject, plan.x, plan.xs)
             over += f" and {titles.taken(plan.subject, plan.y, plan.ys)}"
             blocks = len(plan.ys)
-        step = self.progress.stage(f"{self.request.kind} over {over}", blocks)
+        step = progress.stage(f"{self.request.kind} over {over}", blocks)
         self.made = _computed(plan, self.jobs, self.store(_blocks, plan), step)
         return self.made
 
@@ -187,7 +185,7 @@ class BifurcationWork:
         if self.folder is None:
             return None
         path, vouches = self.folder.path, self.folder.vouches
-        files = WorkFiles(path, self.hash, self.provenance, self.progress.note, vouches)
+        files = WorkFiles(path, self.hash, self.provenance, progress.watched().note, vouches)
         return blocks(plan, files)
 
 
@@ -226,7 +224,7 @@ TABLES = ("windows.csv", "points.csv")
 
 def _sweep(work: BifurcationWork, plan: SweepPlan) -> Made:
     """The sweep, its points, and what else was asked for along it."""
-    progress, jobs, name = work.progress, work.jobs, plan.parameter
+    jobs, name = work.jobs, plan.parameter
     swept, found = work.computed(), None
     assert isinstance(swept, Sweep)
     if work.request.points:
@@ -400,7 +398,7 @@ def _shares(work: BifurcationWork) -> BasinShares | None:
     plan = work.shares
     if plan is None:
         return None
-    step = work.progress.stage(f"{len(plan.numbers)} starts at each value", len(plan.values))
+    step = progress.stage(f"{len(plan.numbers)} starts at each value", len(plan.values))
     return basin_shares.run(plan, work.jobs, work.store(share_blocks, plan), step)
 
 
@@ -420,7 +418,7 @@ def _region(work: BifurcationWork, plan: CurvePlan, swept: Sweep) -> ResponseReg
     if orbit.status is not OrbitStatus.PERIODIC:
         expected = f"a value with a periodic response ({orbit.response} there)"
         raise InputError(None, "--region", work.region, expected)
-    step = work.progress.stage(f"region of {orbit.response}", response_region.RAYS)
+    step = progress.stage(f"region of {orbit.response}", response_region.RAYS)
     found = response_region.region(flows, orbit, at, plan.window, jobs=work.jobs, progress=step)
     return replace(found, spread=_spread_box(work, plan, found))
 
@@ -444,7 +442,7 @@ def _curves(
 ) -> list[BorderCurve]:
     """The curves through the sweep's points, or what of them the folder has not."""
     over = f"bifurcation curves over {plan.first} and {plan.second}"
-    step = work.progress.stage(over, border_curves.BLOCKS * (1 + plan.depth))
+    step = progress.stage(over, border_curves.BLOCKS * (1 + plan.depth))
     return border_curves.run(plan, points, work.jobs, work.store(curve_blocks, plan), step)
 
 
@@ -622,7 +620,6 @@ def requested(
     request: Request,
     out: Path | None,
     options: Options,
-    progress: Progress,
 ) -> BifurcationResult:
     """What is asked for of a model file or a design folder. Nothing is written where the request is
     refused, or ``out`` is None.
@@ -633,9 +630,9 @@ def requested(
     """
     options.check()
     began = time.perf_counter()
-    modelfile, subject = _subject(model, request, progress)
+    modelfile, subject = _subject(model, request)
     plan = plan_of(request, subject, modelfile)
-    work = BifurcationWork(request, plan, modelfile, options.workers, progress)
+    work = BifurcationWork(request, plan, modelfile, options.workers)
     if out is None:
         answer, _ = _make(work)
         answer["cost"]["seconds"] = time.perf_counter() - began
@@ -678,13 +675,11 @@ def _model_hash(modelfile: ModelFile, folder: Folder, kind: StageName) -> str:
     return modelfile.sha256 if said == modelfile.sha256 else modelfile.motions_sha256
 
 
-def _subject(
-    model: Path | str | ModelFile, request: Request, progress: Progress
-) -> tuple[ModelFile, Swept]:
+def _subject(model: Path | str | ModelFile, request: Request) -> tuple[ModelFile, Swept]:
     if request.circuit and not isinstance(model, ModelFile) and Path(model).is_dir():
         from designer.folders.design_source import read_design
 
-        synthesis = read_design(model, progress=progress)
+        synthesis = read_design(model, progress=progress.watched())
         return synthesis.modelfile, BoardSubject(synthesis.design)
     modelfile = model_of(model)
     if request.circuit:

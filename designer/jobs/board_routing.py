@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from designer.base import progress
 from designer.base.atomic_write import appearing
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import file_hash
-from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_names import project_name
@@ -34,7 +34,6 @@ def board_file(synthesis: Synthesis) -> str:
 def route_in_folder(
     folder: Folder,
     synthesis: Synthesis,
-    progress: Progress,
     session: Path | None = None,
     count: int | None = None,
 ) -> RoutingRow:
@@ -73,7 +72,7 @@ def route_in_folder(
     return _answer(name, routed)
 
 
-def route_own_board(folder: Folder, synthesis: Synthesis, progress: Progress) -> None:
+def route_own_board(folder: Folder, synthesis: Synthesis) -> None:
     """Route the folder's board where it is as it was written and nothing is routed yet.
 
     What stands in the way is a note: everything else of the folder goes without tracks.
@@ -82,7 +81,7 @@ def route_own_board(folder: Folder, synthesis: Synthesis, progress: Progress) ->
     if board is None or board.copper:
         return
     try:
-        open_ = route_in_folder(folder, synthesis, progress)["open"]
+        open_ = route_in_folder(folder, synthesis)["open"]
     except InputError as error:
         progress.note(f"the board is not routed: {error}")
         return
@@ -90,9 +89,7 @@ def route_own_board(folder: Folder, synthesis: Synthesis, progress: Progress) ->
         progress.note(f"the board is routed but for {', '.join(open_)}")
 
 
-def write_design(
-    folder: Folder, synthesis: Synthesis, path: Path, options: Options, progress: Progress
-) -> None:
+def write_design(folder: Folder, synthesis: Synthesis, path: Path, options: Options) -> None:
     """Write the folder's board as Specctra's design for another router.
 
     Raises

@@ -12,33 +12,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base import progress
 from designer.base.defaults import Dialect
 from designer.base.design_folder import DESIGN, Folder
-from designer.base.errors import EnvironmentMissing
+from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.frames import table_html
 from designer.base.manifest import ORDERS, DeckStage, OrderStage, StageName, Stages
 from designer.base.plain_json import FORMAT
-from designer.base.progress import Progress
+from designer.base.schema import one_of
 from designer.base.seal import sha256
 from designer.base.version import __version__
 from designer.board.board_facts import check_edge
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_names import project_name
 from designer.board.kicad_reader import BoardFile, read_board
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
+from designer.catalog.design_rules import RULES
 from designer.catalog.fab import Fab, fab_limits, fabs
 from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.stock_list import stock_rows
 from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
+from designer.design_rules.kicad_drc import OPEN, SHORT
 from designer.design_rules.kicad_program import KicadFailed, needed_version
 from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
-from designer.fabrication.order_refusal import (
-    accepted_failures,
-    check_accepted,
-    not_checked,
-    read_back,
-    refusals,
-)
 from designer.folders import board_files, kicad_files
 from designer.folders.design_files import design_provenance
 from designer.folders.model_source import design_inputs_of
@@ -101,7 +98,6 @@ class Export:
     modelfile: ModelFile
     out: Path
     options: Options
-    progress: Progress
 
     def project(self) -> ExportResult:
         """Write the KiCad project."""
@@ -114,10 +110,10 @@ class Export:
             listed = folder.manifest.files.items()
             files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
             note = "so does its KiCad project: --overwrite makes it anew, with what is here"
-            self.progress.note(note)
+            progress.note(note)
         todo = self._decide(folder, kicad_files.stages(inputs, files))
         if todo:
-            self.progress.stage("KiCad project")
+            progress.stage("KiCad project")
             kicad_files.write(folder, synthesis, inputs, files)
         return _result(runner, list(files), reused and not todo)
 
@@ -125,7 +121,7 @@ class Export:
         """Write the project where there is none, and its board for another router."""
         runner, synthesis, reused = self._design()
         self._board(runner, None)
-        write_design(runner.folder, synthesis, file, self.options, self.progress)
+        write_design(runner.folder, synthesis, file, self.options)
         return _result(runner, [], reused, {"dsn": str(file)})
 
     def routed(
@@ -145,7 +141,7 @@ class Export:
             made = self._design()
         runner, synthesis, reused = made
         folder = runner.folder
-        routing = route_in_folder(folder, synthesis, self.progress, session, layers)
+        routing = route_in_folder(folder, synthesis, session, layers)
         listed = {} if folder.manifest is None else folder.manifest.files
         files = [name for name, (stage, _) in listed.items() if stage == kicad_files.STAGE]
         return _result(runner, files, reused, {"routing": routing})
@@ -158,7 +154,7 @@ class Export:
         stages: Stages = {DeckStage.of(d): (dict(inputs), [name]) for d, name in names.items()}
         todo = self._decide(folder, stages)
         if todo:
-            self.progress.stage("decks")
+            progress.stage("decks")
             texts = {
                 name: deck_text(synthesis, dialect)
                 for dialect, name in names.items()
@@ -180,7 +176,7 @@ class Export:
             version = needed_version()
         except KicadFailed as why:
             raise EnvironmentMissing(f"{why}: --fab needs it") from None
-        names, parts, progress = asked.fabs, asked.parts, self.progress
+        names, parts = asked.fabs, asked.parts
         fabs(names, load_catalog().folders)
         check_accepted(asked.accepted)
         stock = () if parts is None else stock_rows(parts, "--parts")
@@ -226,7 +222,7 @@ class Export:
 
     def _design(self) -> tuple[StageRunner, Synthesis, bool]:
         """The folder with its design, and whether the design was there already."""
-        runner = StageRunner(self.modelfile, self.out, self.options, self.progress)
+        runner = StageRunner(self.modelfile, self.out, self.options)
         reused = not runner.decide()
         return runner, runner.design(), reused
 
@@ -297,3 +293,53 @@ def _result(
         **extras,
     }
     return ExportResult(answer, runner.folder.path, reused)
+
+
+WANTED = (OPEN, SHORT)
+"""Rules that have to be run and passed; any other may stay without a run."""
+
+
+def check_accepted(names: Sequence[str]) -> None:
+    """Whether these are rules whose failure may be accepted.
+
+    Raises
+    ------
+    InputError : no such rule, or one without which no board works.
+    """
+    known = [rule.id for rule in RULES if rule.id not in WANTED]
+    for name in names:
+        if name not in known:
+            raise InputError(None, "--accept", name, one_of(name, known))
+
+
+def refusals(outcomes: Sequence[RuleOutcome], accepted: Sequence[str] = ()) -> tuple[str, ...]:
+    """A line for each reason against an order; none where it may be sent.
+
+    accepted : rules that may fail.
+    """
+    return tuple(
+        f"{one.rule.id}: {one.found}; {one.do}"
+        for one in outcomes
+        if (one.status == FAIL and one.rule.id not in accepted)
+        or (one.rule.id in WANTED and one.status != PASS)
+    )
+
+
+def read_back(faults: Sequence[str]) -> tuple[str, ...]:
+    """A line for each fault that an order's files had when they were read back."""
+    do = "fill the zones anew, mend the board, and run export --fab again"
+    return tuple(f"order-files: {fault}; {do}" for fault in faults)
+
+
+def accepted_failures(outcomes: Sequence[RuleOutcome], accepted: Sequence[str]) -> tuple[str, ...]:
+    """A line for each rule that fails and is accepted."""
+    return tuple(
+        f"{one.rule.id}: {one.found}"
+        for one in outcomes
+        if one.status == FAIL and one.rule.id in accepted
+    )
+
+
+def not_checked(outcomes: Sequence[RuleOutcome]) -> tuple[str, ...]:
+    """A line for each rule that was not run, with the reason."""
+    return tuple(f"{one.rule.id}: {one.found}" for one in outcomes if one.status == NOT_RUN)

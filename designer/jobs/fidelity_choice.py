@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from designer.base import progress
 from designer.base.defaults import STUDY_ENGINES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.guarded_reading import reading
-from designer.base.progress import Progress
 from designer.base.si_unit import drive_text
 from designer.fidelity.fidelity_answers import CIRCUIT
 from designer.fidelity.fidelity_errors import BOARD
@@ -76,7 +76,7 @@ def before_search(folder: Folder, model: str) -> FidelityChoice | None:
     return choice if choice.reason else None
 
 
-def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEngine:
+def for_search(folder: Folder, options: Options) -> StudyEngine:
     """The fidelity of the study at the end of a search, and a note of why. ``exact`` stands for "as
     usual": the search's confirmation asks ngspice about `LEAST` boards of each response."""
     if options.rung != "auto":
@@ -90,7 +90,7 @@ def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEng
     return "ngspice" if choice.rung == "ngspice" else "exact"
 
 
-def with_fidelity(folder: Folder, options: Options, progress: Progress) -> Options:
+def with_fidelity(folder: Folder, options: Options) -> Options:
     """The options with a fidelity in place of "auto", and a note of why; a stated fidelity
     stays."""
     if options.rung != "auto":

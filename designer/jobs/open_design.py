@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from designer.base.design_folder import MODEL
-from designer.base.progress import Progress
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile
 
 
-def design_file(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
+def design_file(modelfile: ModelFile, out: Path, options: Options) -> ModelFile:
     """The model file that a verb works with: the given one, or, where it leaves the design to a
     search, that of the folder ``out``, in which the search then writes the design.
 
@@ -20,4 +19,4 @@ def design_file(modelfile: ModelFile, out: Path, options: Options, progress: Pro
         return modelfile
     from designer.jobs.search_stage import searched_into
 
-    return searched_into(modelfile, out, options, progress)
+    return searched_into(modelfile, out, options)

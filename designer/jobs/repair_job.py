@@ -14,20 +14,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base.csv_tables import csv_text
 from designer.base.defaults import SEED
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
 from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
 from designer.base.manifest import Stages
-from designer.base.plain_json import dumps
-from designer.base.progress import Progress
+from designer.base.plain_json import FORMAT, dumps
+from designer.base.progress import Progress, note, reported, stage, watched, whole
 from designer.base.schema import one_of
 from designer.base.second_process import other_process
 from designer.centering.repair_branch import KINDS, kind_named, repaired
 from designer.centering.repair_measure import VerdictCache, is_rare
-from designer.centering.repair_result_json import front_csv, repair_json
 from designer.centering.repair_search import find_repair
+from designer.centering.repair_trial import Repair, Trial
 from designer.centering.repair_upgrade import Upgrades
 from designer.centering.response_windows import need_periods
 from designer.check.synthesis_result import Synthesis
@@ -40,11 +41,13 @@ from designer.jobs.options import Options, stated_options
 from designer.jobs.stage_runner import write_design
 from designer.linear_network.milp import SOLVER
 from designer.model.model_file import ModelFile, errors_in, need_responses
+from designer.model.si_units import hertz_json
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from designer.answers.cure_answer import CureAnswer
+    from designer.answers.cure_answer import CureAnswer, CuredResponse, TrialRow
+    from designer.answers.shared_rows import ProvenanceRow
 
 REPAIR, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
@@ -87,6 +90,7 @@ class CureResult:
         return table_html(title, rows, f"price {self.answer['price']:.4g}")
 
 
+@reported
 def cure(
     folder: Path | str,
     *,
@@ -128,8 +132,7 @@ def cure(
     )
     if "yield" not in settings:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
-    progress = Progress() if progress is None else progress
-    with progress.whole(usual_times.REPAIRED):
+    with whole(usual_times.REPAIRED):
         return repair_into(
             path,
             target=settings["yield"],
@@ -137,7 +140,6 @@ def cure(
             out=None if out is None else Path(out),
             without=settings.get("without", ()),
             options=Options(settings.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
-            progress=progress,
         )
 
 
@@ -149,18 +151,16 @@ def repair_into(
     out: Path | None = None,
     without: Collection[str] = (),
     options: Options | None = None,
-    progress: Progress | None = None,
 ) -> CureResult:
     """As ``cure``, with nothing taken over from an earlier one. target : the yield."""
     options = Options() if options is None else options
-    progress = Progress() if progress is None else progress
     options.check()
     unwanted = _checked(target, budget, without)
     if out is not None:
         if out.resolve() == path.resolve():
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place where something else stands
-    base = read_design(path, progress=progress)
+    base = read_design(path, progress=watched())
     refuse_unreachable(base.modelfile, target, budget, without)
     folder = Folder(path)
     inputs = {
@@ -180,15 +180,15 @@ def repair_into(
             _check_room(base, out, options)
         choice = fidelity_choice.choose(folder)
         if choice.rung == "ngspice":
-            progress.note(
+            note(
                 f"{choice.reason}; a cure is decided on the exact circuit all the same: ask "
                 "ngspice about the cured design (tolerance --rung ngspice)"
             )
-        _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
+        _find_and_write(folder, stages, base, target, budget, unwanted, options)
     answer: CureAnswer = folder.json(REPAIR)
-    renew_report(folder, progress.note)
+    renew_report(folder)
     if out is not None:
-        _write_design(base, answer, out, options, progress)
+        _write_design(base, answer, out, options)
     return CureResult(answer, bool(answer["reached"]), not todo)
 
 
@@ -200,13 +200,12 @@ def _find_and_write(
     budget: float | None,
     unwanted: frozenset[str],
     options: Options,
-    progress: Progress,
 ) -> None:
     """Find the cheapest repair of the design ``base`` and write it into its folder."""
     began = time.perf_counter()
     studies_before = {}
     if folder.manifest and STUDIES in folder.manifest.files:
-        studies_before = _LINES.load(folder / STUDIES, progress.note, folder.vouches)
+        studies_before = _LINES.load(folder / STUDIES, note, folder.vouches)
     origin = provenance(
         base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
     )
@@ -227,9 +226,8 @@ def _find_and_write(
                 seed=options.seed,
                 jobs=options.jobs,
                 verdict_cache=VerdictCache(studies_before, save),
-                progress=progress,
             )
-        progress.stage("report of the cure")
+        stage("report of the cure")
         from designer.base.figure_style import to_png, to_svg
         from designer.centering.repair_plots import front_chart  # matplotlib is not needed before
 
@@ -259,14 +257,12 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
     folder.decide(design_stage(base.modelfile, inputs), overwrite=True, resume=False)
 
 
-def _write_design(
-    base: Synthesis, answer: CureAnswer, out: Path, options: Options, progress: Progress
-) -> None:
+def _write_design(base: Synthesis, answer: CureAnswer, out: Path, options: Options) -> None:
     """The repaired design as a design folder; nothing where there is no repair."""
     if not answer["reached"]:
-        progress.note("no cure: no design is written")
+        note("no cure: no design is written")
         return
-    progress.stage("cured design")
+    stage("cured design")
     synthesis = repaired(base, Upgrades.of_dict(answer["upgrades"]))
     folder = Folder(out)
     stages = design_stage(
@@ -274,7 +270,7 @@ def _write_design(
     )
     if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         with other_process(options.workers) as other:
-            write_design(folder, synthesis, stages, options, progress, other)
+            write_design(folder, synthesis, stages, options, other)
 
 
 def is_out_of_reach(folder: Folder) -> bool:
@@ -339,3 +335,81 @@ def _checked(target: float, budget: float | None, without: Collection[str]) -> f
             raise InputError(None, "--without", name, one_of(name, names))
         kinds.add(kind)
     return frozenset(kinds)
+
+
+COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
+
+
+def repair_json(repair: Repair, provenance: ProvenanceRow, seconds: float) -> CureAnswer:
+    """Everything that was found. Prices are over the design as it is, in euro."""
+    best, file = repair.best, repair.base.modelfile
+    responses: list[CuredResponse] = [
+        {
+            "omega": r.omega,
+            **hertz_json(r.omega, file.si),
+            "b": r.b,
+            "expected": r.expected,
+            "before": before.as_dict(),
+            "after": after.as_dict(),
+            "reached": after.reached,
+            "limit": limit,
+        }
+        for r, before, after, limit in zip(
+            repair.base.model_responses,
+            repair.before.measured,
+            best.measured,
+            repair.limits,
+            strict=True,
+        )
+    ]
+    return {
+        "format": FORMAT,
+        "reached": repair.reached,
+        "why": repair.why,
+        "target": repair.target,
+        "budget": repair.budget,
+        "price": best.price,
+        "branch": best.branch,
+        "upgrades": best.upgrades.as_dict(),
+        "said": best.upgrades.in_words(file),
+        "responses": responses,
+        "rounds": [_trial(t, file) for t in repair.rounds],
+        "front": [_trial(t, file) for t in repair.front],
+        "refused": [{"upgrades": r.upgrades.in_words(file), "why": r.why} for r in repair.refused],
+        "provenance": provenance,
+        "cost": {"seconds": seconds},
+    }
+
+
+def front_csv(repair: Repair) -> str:
+    """The front of yield against price: the yield is that of the worst response."""
+    rows = []
+    for t in repair.front:
+        low, high = t.worst.interval
+        asked, rare = t.worst.counts, t.worst.rare
+        digits = 9 if is_rare(repair.target) else 5
+        rows.append(
+            {
+                "price_euro": f"{t.price:.4g}",
+                "predicted": f"{min(t.predicted):.{digits}g}",
+                "yield": f"{t.worst.rate:.{digits}g}",
+                "low": f"{low:.{digits}g}",
+                "high": f"{high:.{digits}g}",
+                "samples": str(asked.samples if rare is None else rare.boards),
+                "upgrades": "; ".join(t.upgrades.in_words(repair.base.modelfile)),
+                "failed": str(t.worst.counts.failed),
+            }
+        )
+    return csv_text(COLUMNS, rows)
+
+
+def _trial(t: Trial, file: ModelFile) -> TrialRow:
+    return {
+        "branch": t.branch,
+        "price": t.price,
+        "said": t.upgrades.in_words(file),
+        "upgrades": t.upgrades.as_dict(),
+        "predicted": list(t.predicted),
+        "measured": [m.as_dict() for m in t.measured],
+        "reached": t.reached,
+    }

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from designer.base import progress
 from designer.base.defaults import SAMPLES, StudyEngine
 from designer.base.design_folder import Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import FORMAT, dumps, plain
-from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.limiting_parts import limitings
 from designer.centering.ngspice_check import FIDELITY, LEVELS
@@ -58,7 +58,6 @@ def search_into(
     modelfile: ModelFile,
     out: Path,
     options: Options,
-    progress: Progress,
     command: Callable[[Options], str],
 ) -> JobOutcome:
     """Search, study and confirm in the folder ``out``. command : as of ``study_job.run_into``.
@@ -68,12 +67,10 @@ def search_into(
     EnvironmentMissing : there is something to confirm and no ngspice; raised before any work.
     """
     need_ngspice(Folder(out), options)
-    final = searched_into(modelfile, out, options, progress)
-    fidelity = fidelity_choice.for_search(Folder(out), options, progress)
-    study = run_into(
-        final, out, replace(options, rung=fidelity), progress, lambda _: command(options)
-    )
-    confirmed, stood = _confirmed(final, out, options, progress)
+    final = searched_into(modelfile, out, options)
+    fidelity = fidelity_choice.for_search(Folder(out), options)
+    study = run_into(final, out, replace(options, rung=fidelity), lambda _: command(options))
+    confirmed, stood = _confirmed(final, out, options)
     folder = Folder(out)
     search = folder.json(SEARCH)
     for key in ("format", "provenance", "cost"):
@@ -103,14 +100,12 @@ def need_ngspice(folder: Folder, options: Options) -> None:
         program_version()
 
 
-def confirmed_repair(
-    out: Path, options: Options, progress: Progress
-) -> tuple[ConfirmationRow, bool]:
+def confirmed_repair(out: Path, options: Options) -> tuple[ConfirmationRow, bool]:
     """How ngspice judges boards of the repaired design in the folder ``out``, as drawn, and what
     limits each response; whether the folder held that already. The boards are of no study of the
     folder, which has none yet."""
     modelfile, _ = source(out, None)
-    return _confirmed(modelfile, out, replace(options, samples=SAMPLES), progress, studied=False)
+    return _confirmed(modelfile, out, replace(options, samples=SAMPLES), studied=False)
 
 
 def all_confirmed(confirmation: ConfirmationRow) -> bool:
@@ -130,7 +125,6 @@ def _confirmed(
     modelfile: ModelFile,
     out: Path,
     options: Options,
-    progress: Progress,
     *,
     studied: bool = True,
 ) -> tuple[ConfirmationRow, bool]:
@@ -153,7 +147,7 @@ def _confirmed(
         synthesis, stores = design_files.load(folder, modelfile, catalog), None
         if studied:
             stores = FolderStores(out, folder.watch(), progress.note, vouch=folder.vouches)
-        judged = _confirm(synthesis, options, progress, stores)
+        judged = _confirm(synthesis, options, stores)
         with folder.working(stages, provenance(modelfile, catalog.hash, seed=options.seed)):
             document: ConfirmationFile = {
                 "format": FORMAT,
@@ -166,7 +160,7 @@ def _confirmed(
 
 
 def _confirm(
-    synthesis: Synthesis, options: Options, progress: Progress, stores: FolderStores | None
+    synthesis: Synthesis, options: Options, stores: FolderStores | None
 ) -> ConfirmationRow:
     jobs = options.workers
     decides: StudyEngine = "bandwidth" if options.rung == "bandwidth" else "exact"
@@ -174,9 +168,8 @@ def _confirm(
         synthesis,
         replace(options, rung=decides, blame=False, blame_budget=None),
         StudyHelp(jobs, None, LocalRunner(jobs)),
-        check(synthesis, None, progress),
+        check(synthesis, None),
         stores,
-        progress,
     )
     step = progress.stage("what limits each response")
     limits = limitings(study.plan, study.answers, jobs=jobs, progress=step)

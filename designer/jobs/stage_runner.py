@@ -11,11 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from designer.base import progress
 from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import plain
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Show, quiet
 from designer.base.second_process import Ask
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import stage_choice
@@ -52,20 +53,19 @@ class StageRunner:
         modelfile: ModelFile,
         out: Path,
         options: Options,
-        progress: Progress,
         *,
         anew: bool = False,
         shown: Show = quiet,
         ahead: Ahead | None = None,
     ) -> None:
         options.check()
-        self.modelfile, self.options, self.progress = modelfile, options, progress
+        self.modelfile, self.options = modelfile, options
         self.catalog, self.folder, self.shown = load_catalog(), Folder(out), shown
         self.ahead = ahead
         self.stages = (
             design_stage(modelfile, design_inputs(modelfile, self.catalog))
             if anew
-            else standing_design(self.folder, modelfile, self.catalog, progress)
+            else standing_design(self.folder, modelfile, self.catalog)
         )
         self.todo: list[StageName] = []
 
@@ -93,7 +93,7 @@ class StageRunner:
         """The design, made and written if that is to be done, else read. All stages are begun."""
         stages = {stage: self.stages[stage] for stage in self.todo}
         if "design" in stages:
-            self.progress.stage("responses of the model, parts")
+            progress.stage("responses of the model, parts")
             jobs = self.options.workers
             with (
                 compiling_ahead(
@@ -115,7 +115,6 @@ class StageRunner:
                     synthesis,
                     stages,
                     self.options,
-                    self.progress,
                     other,
                     self._other_stage,
                 )
@@ -131,7 +130,7 @@ class StageRunner:
         nothing has to be looked at. It is looked at in the other process."""
         if self.modelfile.circuit.dead_zone is None:
             return None
-        self.progress.stage("the other stage of the clearance")
+        progress.stage("the other stage of the clearance")
         jobs = self.options.workers
         kept = stage_choice.kept_of_doubtful(self.modelfile, synthesis, jobs)
         if kept is None:
@@ -144,7 +143,6 @@ def write_design(
     synthesis: Synthesis,
     stages: Stages,
     options: Options,
-    progress: Progress,
     other: Ask,
     other_stage: Callable[[Synthesis, Ask], Callable[[], str] | None] = lambda *_: None,
 ) -> Synthesis:
@@ -162,7 +160,7 @@ def write_design(
         files = design_files.texts(synthesis)
         drawing = other(board_files.drawing, synthesis)
     inputs = stages["design"][0]
-    project = kicad_files.project_texts(folder, synthesis, inputs, options.overwrite, progress)
+    project = kicad_files.project_texts(folder, synthesis, inputs, options.overwrite)
     folder.begin(stages, design_files.design_provenance(synthesis))
     design_files.write(folder, synthesis, files)
     # The project belongs to a finished design: whoever goes on after an interruption makes both.

@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from designer.base import progress
 from designer.base.design_folder import MEASURED, Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.plain_json import plain
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Show, quiet
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.checked_design import CheckedResponse
@@ -54,7 +55,6 @@ def design_and_study(
     options: Options,
     words: Mapping[str, Any],
     command: Callable[[Options, Path, Path | None], str],
-    progress: Progress | None,
     shown: Show,
     catalog: Catalog | None = None,
     *,
@@ -70,11 +70,10 @@ def design_and_study(
     InputError, Unreachable, ResponseNotFound, EnvironmentMissing : as the verb ``run``.
     """
     options.check()
-    progress = Progress() if progress is None else progress
     if isinstance(model, JobOutcome):
         model = model.synthesis if model.folder is None else model.folder
     if out is None and isinstance(model, ModelFile | Synthesis):
-        return _in_memory(model, options, words, progress, catalog)
+        return _in_memory(model, options, words, catalog)
     argument = model.modelfile if isinstance(model, Synthesis) else model
     argument = argument if isinstance(argument, ModelFile) else Path(argument)
     modelfile, folder = source(argument, out)
@@ -84,13 +83,12 @@ def design_and_study(
     place = None if out is None else Path(out)
     usual = usual_times.RUN if whole_job else usual_times.STUDIED
     with progress.whole({**usual_times.of_design(modelfile), **usual}):
-        modelfile = design_file(modelfile, folder, options, progress)
+        modelfile = design_file(modelfile, folder, options)
         path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
         return run_into(
             modelfile,
             folder,
             options,
-            progress,
             lambda made_with: command(made_with, path, place),
             shown,
             routed=whole_job,
@@ -101,20 +99,19 @@ def _in_memory(
     model: ModelFile | Synthesis,
     options: Options,
     words: Mapping[str, Any],
-    progress: Progress,
     catalog: Catalog | None,
 ) -> JobOutcome:
     modelfile = model if isinstance(model, ModelFile) else model.modelfile
     need_responses(modelfile)
     options = folder_numbers.of_list(modelfile, options, words)
-    with StudyHelp.of(options, progress) as help_:
+    with StudyHelp.of(options) as help_:
         progress.stage("responses of the model, parts")
         synthesis = model
         if isinstance(synthesis, ModelFile):
             synthesis = stage_choice.synthesise(synthesis, catalog, jobs=options.workers)
         began = time.perf_counter()
-        equations, checked = checks_in_memory(synthesis, help_.pool, progress)
-        study = study_of(synthesis, options, help_, checked, progress=progress)
+        equations, checked = checks_in_memory(synthesis, help_.pool)
+        study = study_of(synthesis, options, help_, checked)
     cost = {"study_seconds": time.perf_counter() - began, "design_seconds": synthesis.seconds}
     result = run_result(synthesis, study, options, cost, equations)
     answer = run_json(plain(design_files.answer(synthesis)), plain(result_json(result)))
@@ -125,7 +122,6 @@ def run_into(
     modelfile: ModelFile,
     out: Path,
     options: Options,
-    progress: Progress,
     command: Callable[[Options], str],
     shown: Show = quiet,
     *,
@@ -142,8 +138,8 @@ def run_into(
     """
     options.check()
     need_responses(modelfile)
-    options = fidelity_choice.with_fidelity(Folder(out), options, progress)
-    runner = StageRunner(modelfile, out, options, progress, shown=shown)
+    options = fidelity_choice.with_fidelity(Folder(out), options)
+    runner = StageRunner(modelfile, out, options, shown=shown)
     folder = runner.folder
     # A study is of the boards as they are bought now, whatever the design's own inputs say.
     design_now = design_inputs(modelfile, runner.catalog)
@@ -157,13 +153,13 @@ def run_into(
     if not runner.decide(stages):
         return _outcome(folder, RANDOM, reused=True)
     began = time.perf_counter()
-    with StudyHelp.of(options, progress) as help_:
+    with StudyHelp.of(options) as help_:
         synthesis = runner.design()
         if bills_are_of_old(runner.design_inputs, design_now):
             design_files.renew_bills(folder, synthesis)
         if routed:
-            route_own_board(folder, synthesis, progress)
-        stage = StudyStage(folder, RANDOM, synthesis, options, command(options), progress, shown)
+            route_own_board(folder, synthesis)
+        stage = StudyStage(folder, RANDOM, synthesis, options, command(options), shown)
 
         def checked(first: CheckedResponse) -> None:
             if first.gate is not None and first.gate.passed:
@@ -178,7 +174,6 @@ def measured_into(
     path: Path,
     file: Path,
     options: Options,
-    progress: Progress,
     command: Callable[[Options], str],
     shown: Show = quiet,
 ) -> JobOutcome:
@@ -202,7 +197,7 @@ def measured_into(
     modelfile, _ = source(path, path)
     need_responses(modelfile)
     options = replace(options, samples=len(boards.boards), measured=file)
-    runner = StageRunner(modelfile, path, options, progress)
+    runner = StageRunner(modelfile, path, options)
     folder = runner.folder
     if folder.decide(runner.stages, overwrite=False, resume=False):
         raise InputError(path, "the design", "unfinished", "a finished one (designer synthesise)")
@@ -212,7 +207,7 @@ def measured_into(
         spread_of(
             synthesis.modelfile, synthesis.design.circuit, runner.catalog
         )  # refuses what is not theirs
-    options = fidelity_choice.with_fidelity(folder, options, progress)
+    options = fidelity_choice.with_fidelity(folder, options)
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
     inputs = {**runner.design_inputs, **numbers, **folder_numbers.fidelity_input(options)}
@@ -222,10 +217,10 @@ def measured_into(
     stages[BUILT.stage][1].append(list_file)
     if not folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
         return _outcome(folder, BUILT, made=synthesis, reused=True)
-    with StudyHelp.of(options, progress) as help_:
+    with StudyHelp.of(options) as help_:
         folder.begin(stages)
         folder.write(list_file, boards.content)
-        stage = StudyStage(folder, BUILT, synthesis, options, command(options), progress, shown)
+        stage = StudyStage(folder, BUILT, synthesis, options, command(options), shown)
         result = stage.work(help_)
     return _outcome(folder, BUILT, made=synthesis, result=result, shown=stage.early)
 

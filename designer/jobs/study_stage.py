@@ -13,13 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base import progress
 from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.keyed_store import Note
 from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.printed import one_line
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Show, quiet
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.folders import design_files, kicad_files, study_json
@@ -105,7 +106,7 @@ class StudyHelp:
 
     @classmethod
     @contextmanager
-    def of(cls, options: Options, progress: Progress) -> Iterator[StudyHelp]:
+    def of(cls, options: Options) -> Iterator[StudyHelp]:
         """What these options need, looked for before anything is written.
 
         Raises
@@ -139,8 +140,6 @@ class StudyStage:
     options: Options
     command: str
     """The command line that its report states."""
-    progress: Progress
-    """Is told how far the work is."""
     shown: Show
     """Shows the yields while the work goes on."""
     early: bool = False
@@ -161,16 +160,16 @@ class StudyStage:
         """
         folder, place, options = self.folder, self.place, self.options
         began = time.perf_counter()
-        cache = place.cache(folder, self.progress.note)
-        equations, responses = checks(folder, self.synthesis, help_.pool, cache, self.progress)
+        cache = place.cache(folder, progress.note)
+        equations, responses = checks(folder, self.synthesis, help_.pool, cache)
         checked(responses[0])
         ready, guard = time.perf_counter(), folder.watch()
         stores = FolderStores(
             folder.path,
             guard,
-            self.progress.note,
+            progress.note,
             cache,
-            place.cache(folder, self.progress.note, PIECES),
+            place.cache(folder, progress.note, PIECES),
             place.prefix,
             folder.vouches,
             noise=options.attribution_anew,
@@ -192,7 +191,7 @@ class StudyStage:
         def sampled(study: Study) -> None:
             if help_.pool is None:
                 return
-            self.progress.note("yields of the exact circuit; ngspice is now asked about boards")
+            progress.note("yields of the exact circuit; ngspice is now asked about boards")
             self.shown(run_json(design_answer(folder), plain(result_json(result_of(study)))))
 
         def standing(study: Study) -> None:
@@ -201,9 +200,7 @@ class StudyStage:
             self.early = True
             self.shown(place.answer(folder))
 
-        study = study_of(
-            self.synthesis, options, help_, responses, stores, self.progress, sampled, standing
-        )
+        study = study_of(self.synthesis, options, help_, responses, stores, sampled, standing)
         guard()
         cache.forget_unused()
         result = result_of(study)
@@ -226,7 +223,7 @@ class StudyStage:
             wanted = [(c.model.omega, c.model.expected) for c in result.checked]
             labels = measured_table.response_labels(wanted)
             folder.write(prefix + BOARDS, measured_table.boards_csv(labels, boards))
-        self.progress.stage("report")
+        progress.stage("report")
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
 
@@ -248,7 +245,6 @@ def study_of(
     help_: StudyHelp,
     checked: tuple[CheckedResponse, ...],
     stores: Stores | None = None,
-    progress: Progress | None = None,
     sampled: Callable[[Study], None] = quiet,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
@@ -270,7 +266,6 @@ def study_of(
         checked=checked,
         stores=stores,
         runner=help_.runner,
-        progress=progress,
         sampled=sampled,
         standing=standing,
     )
@@ -294,7 +289,8 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
     fidelity = stage.inputs.get("rung", "exact")
     options = Options(stage.inputs["seed"], samples=samples, rung=fidelity, blame=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
-    return study_of(synthesis, options, help_, check(synthesis, None), stores)
+    with progress.report_to(progress.Progress()):  # its stages are no stages of this work
+        return study_of(synthesis, options, help_, check(synthesis, None), stores)
 
 
 def checks(
@@ -302,22 +298,21 @@ def checks(
     synthesis: Synthesis,
     pool: SpicePool | None,
     cache: StudyCache,
-    progress: Progress,
 ) -> Checks:
     """The checks of a design, made now or taken from the folder."""
     if pool is None:
-        return None, check(synthesis, None, progress)
+        return None, check(synthesis, None)
     assert folder.manifest is not None
     key = checks_hash(folder.manifest.files[DESIGN][1], pool.version)
     equations: EquationCheck | None = cache.get("equations", key)
     if equations is None:
-        equations = _equations(synthesis, pool, progress)
+        equations = _equations(synthesis, pool)
         if not any(finding.reason for finding in equations.findings):
             cache.put("equations", key, equations)
     if not equations.passed:
         progress.note(equations.problem)
     gates = cache.get("gates", key)
-    checked = check(synthesis, pool, progress, gates)
+    checked = check(synthesis, pool, gates)
     results = tuple(c.gate for c in checked)
     # A run without an answer is asked again the next time.
     if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in results):
@@ -325,13 +320,13 @@ def checks(
     return equations, checked
 
 
-def checks_in_memory(synthesis: Synthesis, pool: SpicePool | None, progress: Progress) -> Checks:
+def checks_in_memory(synthesis: Synthesis, pool: SpicePool | None) -> Checks:
     """The checks of a design."""
-    equations = None if pool is None else _equations(synthesis, pool, progress)
-    return equations, check(synthesis, pool, progress)
+    equations = None if pool is None else _equations(synthesis, pool)
+    return equations, check(synthesis, pool)
 
 
-def _equations(synthesis: Synthesis, pool: SpicePool, progress: Progress) -> EquationCheck:
+def _equations(synthesis: Synthesis, pool: SpicePool) -> EquationCheck:
     progress.stage("ngspice, equation check")
     return equation_check.check(synthesis.design, synthesis.model_responses, pool)
 

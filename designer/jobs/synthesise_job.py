@@ -10,10 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from designer.base import progress
 from designer.base.design_folder import COMPARISON, COMPARISON_PICTURES, Folder
 from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Show, quiet
 from designer.catalog.parts_catalog import Catalog
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Ahead, Synthesis
@@ -39,7 +40,6 @@ def synthesise_into(
     modelfile: ModelFile,
     out: Path,
     options: Options,
-    progress: Progress,
     shown: Show = quiet,
     *,
     compare: bool = False,
@@ -47,13 +47,13 @@ def synthesise_into(
 ) -> JobOutcome:
     """The design in the folder ``out``; with ``compare`` the comparison is a stage of its own.
     shown, ahead : as of ``StageRunner``."""
-    runner = StageRunner(modelfile, out, options, progress, anew=True, shown=shown, ahead=ahead)
+    runner = StageRunner(modelfile, out, options, anew=True, shown=shown, ahead=ahead)
     names = [COMPARISON, *COMPARISON_PICTURES]
     stages: Stages = {"comparison": (runner.design_inputs, names)} if compare else {}
     synthesis = runner.design() if runner.decide(stages) else None
     folder = runner.folder
     if synthesis is not None and "comparison" in runner.todo:
-        document = _comparison(synthesis, progress)
+        document = _comparison(synthesis)
         folder.write(COMPARISON, dumps(document))
         _draw(folder, document)
         folder.finish("comparison")
@@ -64,7 +64,7 @@ def synthesise_into(
 
 
 def synthesise_in_memory(
-    modelfile: ModelFile, catalog: Catalog | None, compare: bool, jobs: int, progress: Progress
+    modelfile: ModelFile, catalog: Catalog | None, compare: bool, jobs: int
 ) -> JobOutcome:
     progress.stage("responses of the model, parts")
     synthesis = stage_choice.synthesise(modelfile, catalog, jobs=jobs)
@@ -72,14 +72,14 @@ def synthesise_in_memory(
     synthesis = replace(synthesis, better_stage=better)
     answer: DesignAnswer = plain(design_files.answer(synthesis))
     if compare:
-        answer = _with_comparison(answer, plain(_comparison(synthesis, progress)))
+        answer = _with_comparison(answer, plain(_comparison(synthesis)))
     return JobOutcome(answer, _all_shown(answer), made=synthesis)
 
 
-def _comparison(synthesis: Synthesis, progress: Progress) -> ComparisonFile:
+def _comparison(synthesis: Synthesis) -> ComparisonFile:
     """The JSON object of ``compare.json``."""
     began = time.perf_counter()
-    columns = compare_designs(synthesis, lambda name: _stage(progress, name))
+    columns = compare_designs(synthesis, _stage)
     seconds = time.perf_counter() - began
     provenance = design_files.design_provenance(synthesis)
     return file_json(comparison_json(columns), synthesis.modelfile.title, provenance, seconds)
@@ -110,5 +110,5 @@ def _all_shown(answer: DesignAnswer) -> bool:
     return all(knob["found"] for knob in answer["knobs"])
 
 
-def _stage(progress: Progress, name: str) -> None:
+def _stage(name: str) -> None:
     progress.stage(f"comparison: {name}")

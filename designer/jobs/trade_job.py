@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.base import progress
 from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
-from designer.base.progress import Progress
 from designer.centering import stage_choice
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import fidelity_answers as trade_fidelities, pieces as trade_pieces, yields
@@ -52,7 +52,6 @@ class TradeExtent:
     levels: tuple[tuple[float, float], ...] = LEVELS
     """Levels of ngspice's steps."""
     rounds: int = ROUNDS
-    """Rounds of timing."""
     truth: Truths = TOP
     """What stands for the board: our full op-amps, or the vendor's macromodel."""
 
@@ -64,7 +63,6 @@ def measure(
     *,
     seed: int,
     jobs: int,
-    progress: Progress,
 ) -> Trade:
     """Every fidelity on every response of a design, and the boards.
 
@@ -109,7 +107,7 @@ def measure(
                 if isinstance(plan, str):
                     boards = LeftOut(label, plan)
                 else:
-                    tallied = _tally(plan, label, count, pieces, pool, jobs, progress)
+                    tallied = _tally(plan, label, count, pieces, pool, jobs)
                     boards = BoardTrade.of(label, tallied, seconds)
             responses.append(TradedResponse(rows, truth, boards))
     return traded(responses)
@@ -122,7 +120,6 @@ def _tally(
     pieces: TradePieces,
     pool: SpicePool,
     jobs: int,
-    progress: Progress,
 ) -> Tally:
     """The boards of one response, of ``count``, piece by piece."""
     total = Tally()
@@ -144,7 +141,6 @@ def answer(
     out: Path | None,
     options: Options,
     extent: TradeExtent,
-    progress: Progress,
 ) -> tuple[TradeAnswer, bool]:
     """The JSON object, and whether the folder held it already; ``out`` None writes nothing."""
     options.check()
@@ -152,14 +148,14 @@ def answer(
     if out is None:
         progress.stage("responses of the model, parts")
         synthesis = stage_choice.synthesise(modelfile, jobs=options.workers)
-        return _document(synthesis, extent, TradePieces(), options, progress), False
-    runner = StageRunner(modelfile, out, options, progress)
+        return _document(synthesis, extent, TradePieces(), options), False
+    runner = StageRunner(modelfile, out, options)
     folder = runner.folder
     levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
     inputs = {**runner.design_inputs, **asdict(extent), "levels": levels, "seed": options.seed}
     inputs |= {"rules": RULES, **grade_inputs(modelfile, runner.catalog)}
     if not runner.decide({"trade": (inputs, [*NAMES, PIECES])}):
-        renew_report(folder, progress.note)
+        renew_report(folder)
         return folder.json(TRADE), True
     key = ManifestStage(inputs).hash
     unfinished = folder.state("trade", inputs) == "unfinished"
@@ -172,12 +168,12 @@ def answer(
         guard()
         folder.write(PIECES, text)
 
-    document = _document(synthesis, extent, TradePieces(pieces, save, key), options, progress)
+    document = _document(synthesis, extent, TradePieces(pieces, save, key), options)
     guard()
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)
     folder.finish("trade")
-    renew_report(folder, progress.note)
+    renew_report(folder)
     return folder.json(TRADE), False
 
 
@@ -186,13 +182,10 @@ def _document(
     extent: TradeExtent,
     pieces: TradePieces,
     options: Options,
-    progress: Progress,
 ) -> TradeAnswer:
     from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
 
-    measured = measure(
-        synthesis, extent, pieces, seed=options.seed, jobs=options.workers, progress=progress
-    )
+    measured = measure(synthesis, extent, pieces, seed=options.seed, jobs=options.workers)
     file = synthesis.modelfile
     origin = provenance(
         file,

@@ -9,6 +9,7 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count, islice
 from typing import Annotated, Literal
 
 import numpy as np
@@ -23,7 +24,23 @@ from designer.laws.hertz_law import HertzPieces, hertz_pieces
 from designer.laws.law_elements import KINDS, CubicSpring, Friction, Law, NonlinearElement
 from designer.model.clearance import Side
 from designer.model.matrices import Matrices
-from designer.model.waveforms import Waveform, series
+
+Waveform = Literal["square", "triangle", "sawtooth"]
+
+
+def series(waveform: Waveform, terms: int) -> Iterator[tuple[int, float]]:
+    """(n, amplitude of sin nθ) of the first ``terms`` harmonics that the waveform has."""
+    return islice(_terms(waveform), terms)
+
+
+def _terms(waveform: Waveform) -> Iterator[tuple[int, float]]:
+    if waveform == "sawtooth":
+        yield from ((n, (-1.0) ** (n + 1) * 2.0 / (math.pi * n)) for n in count(1))
+    for n in count(1, 2):
+        if waveform == "square":
+            yield n, 4.0 / (math.pi * n)
+        else:
+            yield n, (-1.0) ** (n // 2) * 8.0 / (math.pi * n) ** 2
 
 
 @dataclass(frozen=True)

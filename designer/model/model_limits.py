@@ -373,13 +373,3 @@ def _meant(data: Mapping[str, object], formats: Sequence[type[FileTable]]) -> st
         listed = ", ".join(f"[{key}]" for key in data if key in own)
         return f"with {listed} it is format = {fits[0]}"
     return "format = 1 has [model] or [mechanical], format = 2 any [[mass]] and what joins them"
-
-
-def limits_table() -> list[str]:
-    """The rows of the table in docs/model-file.md."""
-    rows = []
-    for limit in LIMITS:
-        if limit.example:
-            formats = " and ".join(map(str, limit.formats))
-            rows.append(f"| {limit.feature} | {formats} | {limit.example} | {limit.nearest} |")
-    return rows

@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from designer.base import progress
 from designer.base.arrays import Array
 from designer.base.defaults import check_count, cores
 from designer.base.plain_json import plain
-from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -293,7 +293,6 @@ def reproduce(
     out: Path,
     *,
     jobs: int | None = None,
-    progress: Progress | None = None,
     resume: bool = False,
     extent: CircuitExtent | None = None,
 ) -> None:
@@ -308,7 +307,6 @@ def reproduce(
         settings; a number that cannot be.
     EnvironmentMissing : ngspice is missing; nothing is written then.
     """
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     check_count("--jobs", jobs, 1)
     extent = CircuitExtent() if extent is None else extent
@@ -321,7 +319,7 @@ def reproduce(
     progress.stage("responses of the model")
     modelfile = model_with("saturation")
     wanted = [r for p, r in zip(OMEGA, modelfile.responses, strict=True) if p in extent.p]
-    bench = _Bench(catalog, find(modelfile.model, wanted), extent, jobs, progress)
+    bench = _Bench(catalog, find(modelfile.model, wanted), extent, jobs)
     pieces = {
         name: store.piece(name, partial(_timed, make)) for name, make in bench.pieces().items()
     }
@@ -365,7 +363,6 @@ class _Bench:
     wanted: tuple[ModelResponse, ...]
     extent: CircuitExtent
     jobs: int
-    progress: Progress
 
     def pieces(self) -> dict[str, Callable[[], dict[str, Any]]]:
         """What makes each piece, by name, in order."""
@@ -390,12 +387,12 @@ def _model(bench: _Bench) -> dict[str, Any]:
 
 def _circuit(bench: _Bench, name: str) -> dict[str, Any]:
     """Fig. 7 and Fig. 8 of one circuit."""
-    bench.progress.stage(f"{TITLES[name]}: parts, exact circuit")
+    progress.stage(f"{TITLES[name]}: parts, exact circuit")
     one = build(name, bench.catalog)
     assert one.errors is not None
     settled = follow(one, bench.wanted)
     threshold = one.errors.scales.threshold
-    bench.progress.stage(f"{TITLES[name]}: ngspice")
+    progress.stage(f"{TITLES[name]}: ngspice")
     with SpicePool(bench.jobs, timeout=900.0) as pool:
         spice = stage_curve(pool, one.circuit, DC_REACH * threshold, DC_POINTS)
         ngspice = ngspice_responses(pool, one, settled)
@@ -446,7 +443,7 @@ def _lines(v1: Array, out: Array, threshold: float) -> dict[str, float]:
 
 def _misprints(bench: _Bench) -> dict[str, Any]:
     all_of_them = misprints.MISPRINTS
-    step = bench.progress.stage("misprints", len(all_of_them))
+    step = progress.stage("misprints", len(all_of_them))
     rows = []
     for m in all_of_them:
         row: dict[str, Any] = {
@@ -475,7 +472,7 @@ def _offsets(bench: _Bench, name: str) -> dict[str, Any]:
     out: dict[str, Any] = {"circuit": name, "title": TITLES[name], "sizes": {}}
     for kind, size in (("typical", offset.typ), ("maximum", offset.max)):
         assert size is not None
-        bench.progress.stage(f"{TITLES[name]}: {kind} offset of {1e3 * size:g} mV")
+        progress.stage(f"{TITLES[name]}: {kind} offset of {1e3 * size:g} mV")
         out["sizes"][kind] = shifts(
             one, bench.wanted, size, jobs=bench.jobs, most=bench.extent.patterns
         )
@@ -490,7 +487,7 @@ def _clock(bench: _Bench) -> dict[str, Any]:
             p = next(p for p, omega in OMEGA.items() if omega == r.omega)
             if p not in bench.extent.clocked:
                 continue
-            step = bench.progress.stage(f"times at ω = {r.omega:g}", bench.extent.rounds)
+            step = progress.stage(f"times at ω = {r.omega:g}", bench.extent.rounds)
             methods = circuit_clock.measure(
                 pool, one, r, f, rounds_=bench.extent.rounds, progress=step
             )

@@ -22,9 +22,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from matplotlib.figure import Figure
 
+from designer.base import progress
 from designer.base.atomic_write import write
 from designer.base.errors import InputError
-from designer.base.progress import Progress
 from designer.base.report_pieces import check_report_folder
 from designer.bifurcations import border_curves, sweep
 from designer.bifurcations.border_curve import BorderCurve
@@ -91,13 +91,12 @@ class ResponseBorders:
 
 
 def response_borders(
-    windows: Sequence[BranchWindow], second: str, jobs: int = 1, progress: Progress | None = None
+    windows: Sequence[BranchWindow], second: str, jobs: int = 1
 ) -> ResponseBorders:
     """The borders that pass the ends of these windows over ω.
 
     second : a key of ``SECOND``.
     """
-    progress = Progress() if progress is None else progress
     plane_window = PlaneWindow(OMEGA, SECOND[second])
     at = MODEL.parameter(second)
     plan = CurvePlan(ModelSubject(MODEL), "omega", second, at, plane_window)
@@ -159,7 +158,6 @@ def reproduce(
     out: Path,
     *,
     jobs: int = 1,
-    progress: Progress | None = None,
     extent: DynamicsExtent | None = None,
 ) -> Dynamics:
     """Write the report into a folder, which is result; an earlier report in it is replaced.
@@ -172,7 +170,6 @@ def reproduce(
         Nothing is written then.
     """
     extent = DynamicsExtent() if extent is None else extent
-    progress = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
         check_report_folder(out, NAMES, DATA, COMMAND)
@@ -180,11 +177,11 @@ def reproduce(
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"
         ) from None
-    dynamics = measure(extent, progress)
+    dynamics = measure(extent)
     source = _provenance(extent)
-    sweeps = {name: _sweep(name, jobs, progress) for name in extent.figures}
+    sweeps = {name: _sweep(name, jobs) for name in extent.figures}
     mains = [w for _, w in symmetric_mains(dynamics.windows)]
-    borders = [response_borders(mains, name, jobs, progress) for name in extent.borders]
+    borders = [response_borders(mains, name, jobs) for name in extent.borders]
     figures = _figures(dynamics, extent, sweeps) | {b.name: b.figure() for b in borders}
     page = dynamics_page(dynamics, figures, COMMAND, first=FIRST, starts=STARTS)
     write_files(out, (DATA, _document(dynamics, extent, source)), page, figures, ("png", "svg"))
@@ -211,7 +208,7 @@ def _provenance(extent: DynamicsExtent) -> ProvenanceRow:
     )
 
 
-def measure(extent: DynamicsExtent, progress: Progress) -> Dynamics:
+def measure(extent: DynamicsExtent) -> Dynamics:
     """Branches, windows, what coexists, and the judgement of each statement."""
     over = swept_model.of_model(MODEL, FIRST, "omega")
     first = settle(over.flow(FIRST), np.zeros(4))
@@ -254,7 +251,7 @@ def _named(orbit: Orbit) -> str:
     return orbit.response + (" (AS)" if orbit.symmetric is False and orbit.p == orbit.q else "")
 
 
-def _sweep(name: str, jobs: int, progress: Progress) -> sweep.Sweep:
+def _sweep(name: str, jobs: int) -> sweep.Sweep:
     low, high, steps = FIGURES[name]
     values = np.linspace(low, high, steps)
     plan = sweep.SweepPlan(ModelSubject(MODEL), "omega", values, **sweep.follow("down", "up"))

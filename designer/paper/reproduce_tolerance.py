@@ -25,12 +25,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from designer.base import progress
 from designer.base.arrays import Array
 from designer.base.atomic_write import write
 from designer.base.defaults import check_count, check_seed, cores
 from designer.base.figure_style import INK, MUTED, new_figure, number_cells, styled
 from designer.base.page import Block, Page, PageSection, Picture, bullets, table
-from designer.base.progress import Progress
 from designer.base.proportion import wilson
 from designer.base.report_pieces import CaseStore
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -201,7 +201,6 @@ def reproduce(
     samples: int = SAMPLES,
     seed: int = SEED,
     jobs: int | None = None,
-    progress: Progress | None = None,
     resume: bool = False,
     only: Sequence[str] | None = None,
     short: int = SHORT,
@@ -218,7 +217,6 @@ def reproduce(
     InputError : results, or files that go by their names, are there already; results of other
         settings; a number that cannot be.
     """
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     for name, value in (("--samples", samples), ("--jobs", jobs)):
         check_count(name, value, 1)
@@ -233,10 +231,7 @@ def reproduce(
     }
     store.expect({name: _key(case, short, catalog.hash) for name, case in asked.items()})
     short = min(short, samples)
-    pieces = [
-        store.piece(name, partial(_case, case, short, jobs, progress))
-        for name, case in asked.items()
-    ]
+    pieces = [store.piece(name, partial(_case, case, short, jobs)) for name, case in asked.items()]
     rows = tuple(YieldRow(**row) for piece in pieces for row in piece["rows"])
     settings = {"samples": samples, "short": short, "bands": Bands().as_dict()}
     source = provenance(model_file(), catalog.hash, seed=seed, settings=settings)
@@ -258,7 +253,7 @@ def _answers(pieces: Sequence[dict[str, Any]], rows: Sequence[YieldRow]) -> dict
     }
 
 
-def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[str, Any]:
+def _case(case: SpreadCase, short: int, jobs: int) -> dict[str, Any]:
     """Everything about one case, as plain data."""
     began, plan = time.perf_counter(), case.plan
     number = len(plan.questions)

@@ -76,7 +76,6 @@ class Routes:
     open: Mapping[int, int]
     """Nets with connections that no way was found for, and how many."""
     rounds: int
-    """Rounds of negotiation."""
 
 
 def find_routes(copper: BoardCopper, kinds: Sequence[NetKind], of: Mapping[int, str]) -> Routes:

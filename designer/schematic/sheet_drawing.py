@@ -131,9 +131,7 @@ class SheetCell:
     outlet: Inlet | None = None
     """Where the wire of what it makes ends on the right; None where it makes nothing."""
     left: int = 0
-    """Its left edge."""
     right: int = 0
-    """Its right edge."""
     top: int = 0
     """Its upper edge."""
     bottom: int = 0

@@ -51,7 +51,6 @@ class ResponseRun:
     excitation: Excitation
     """The generator's setting."""
     settings: SolverSettings
-    """Settings of ngspice."""
     stop_time: float
     """End of the run [s]."""
     initial: Array | None

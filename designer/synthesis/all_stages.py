@@ -40,11 +40,9 @@ class StageQuestion:
     """What the stages are chosen for, and from what."""
 
     model: MechanicalModel
-    """The wanted model."""
     stage: DeadZoneStage
     """The kind of the dead zones."""
     limits: ConditionLimits
-    """The side conditions."""
     peaks: Peaks
     """What the circuit has to hold."""
     output: OutputStage

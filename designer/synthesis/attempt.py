@@ -50,7 +50,6 @@ class Order:
     """What is to be built, and from what."""
 
     model: MechanicalModel
-    """The wanted model."""
     spec: CircuitSpec
     """What the circuit is to be made of."""
     opamp: OpAmp

@@ -59,7 +59,6 @@ class DeadZoneTarget:
     strict: bool = True
     """Whether these limits are conditions; otherwise they only say where the search begins."""
     kind: circuit_table.DeadZone = "saturation"
-    """Kind of the stage."""
     sides: Sides = "both"
     """The stops that exist."""
     excursion: float = 1.0

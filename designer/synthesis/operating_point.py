@@ -67,7 +67,6 @@ class Operating:
     reference: dict[str, Peak] = field(default_factory=dict)
     """Least current through each shunt reference, as its negative [A]."""
     runs: list[str] = field(default_factory=list)
-    """Names of the runs."""
     left_out: dict[str, str] = field(default_factory=dict)
     """Runs without an answer."""
 

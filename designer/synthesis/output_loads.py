@@ -72,7 +72,6 @@ class Load:
     """Extremes of one section's output over all runs."""
 
     section: str
-    """Name of the section."""
     low: float
     """Lowest voltage of the output [V]."""
     high: float

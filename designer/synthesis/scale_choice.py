@@ -108,7 +108,6 @@ class ScaleChoice:
     order: Order
     """What is to be built, and from what."""
     within: ConditionLimits
-    """The side conditions."""
     jobs: int = 1
     """Threads that descend; no choice depends on it."""
     candidates: list[RoundedChoice] = field(default_factory=list)

@@ -29,7 +29,6 @@ class TableRows:
     """One table of the program."""
 
     table: ValueTable
-    """Values of the table."""
     error: Array
     """(rows,) error of each row."""
     key: Index

@@ -23,7 +23,6 @@ class ValueTable:
     """Combinations of values."""
 
     names: tuple[str, ...]
-    """Names of the parts."""
     values: Array
     """(rows, parts) values [ohm], parts in the order of ``names``."""
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from designer.base.defaults import cores
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported, stage, watched
 from designer.verbs.console import answering, say, table
 from designer.verbs.declared import DesignDir, Jobs, Overwrite, Verb, option
 from designer.verbs.tables import YES_NO, drive_cells, files as written
@@ -60,6 +60,7 @@ class BenchAnswer:
         return table_html(self.answer["title"], [_row(r) for r in self.answer["records"]], "")
 
 
+@reported
 def bench(
     folder: DesignDir,
     record: Annotated[
@@ -143,7 +144,6 @@ def bench(
 
     roles = channels_of(channels) if isinstance(channels, str) else channels
     began, path = time.perf_counter(), Path(folder)
-    progress = Progress() if progress is None else progress
     files, decays = [Path(name) for name in record], [Path(name) for name in decay]
     place = None if out is None else Path(out)
     names = bench_job.picture_names(files)
@@ -155,7 +155,7 @@ def bench(
         found, expected = "all records in one folder", "a folder for each board, with its name"
         raise InputError(None, "--boards", found, f"{expected}; --fit takes them as of one board")
     catalog = load_catalog()
-    synthesis = read_design(path, catalog, progress)
+    synthesis = read_design(path, catalog, watched())
     prediction = BoardPrediction(synthesis)
     bench_job.check_fits(prediction, fit=fit, boards=boards, decays=decays)
     scales = synthesis.design.errors.scales
@@ -168,15 +168,13 @@ def bench(
     free = bench_job.free_decays(decays, files, motions, prediction, boards)
     benched = []
     for file, motion in zip(files, motions, strict=True):
-        progress.stage(f"record {file.name}")
+        stage(f"record {file.name}")
         name = identify_response(motion, prediction)
         setting = bench_job.near_setting(name.motion.frequency, prediction)
         benched.append(bench_job.BenchedRecord(file, name, overlaid(name, prediction), setting))
     fitted: dict[str, FittedBoard] = {}
     if fit or boards or decays:
-        fitted = bench_job.fitted_boards(
-            benched, free, prediction, several=boards, progress=progress
-        )
+        fitted = bench_job.fitted_boards(benched, free, prediction, several=boards)
         benched = [replace(b, board=fitted[bench_job.board_name(b.path, boards)]) for b in benched]
     fits = {name: one.fit for name, one in fitted.items() if one.fit is not None}
     settings = {
@@ -209,15 +207,15 @@ def bench(
     answered = result(benched)
     if place is None:
         return answered
-    progress.stage("pictures")
+    stage("pictures")
     bench_job.write_answer(place, names, answered.answer, answered.records)
     if lists:
         bench_job.put(place / bench_job.LIST, measured_list(fits, bench_job.LISTED).encode("utf-8"))
     if place.resolve().is_relative_to(path.resolve()):
-        renew_report(Folder(path), progress.note)
+        renew_report(Folder(path))
     if ngspice and any(each.overlay is not None for each in benched):
-        progress.stage("ngspice")
-        answered = result(bench_job.with_ngspice(benched, prediction, jobs or cores(), progress))
+        stage("ngspice")
+        answered = result(bench_job.with_ngspice(benched, prediction, jobs or cores()))
         bench_job.write_answer(place, names, answered.answer, answered.records)
     return answered
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from designer.base.defaults import CURVE_DEPTH, SEED
 from designer.base.errors import InputError
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported
 from designer.base.si_unit import Unit, quantity_text, span_text, suffix, value_text
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Kind, Out, Overwrite, Resume, Seed, Source, Verb, option
@@ -34,6 +34,7 @@ LONGEST = 40
 """Lines of a table; the JSON object has them all."""
 
 
+@reported
 def bifurcation(
     model: Source,
     *,
@@ -168,7 +169,7 @@ def bifurcation(
     request = Request(**{each.name: words[each.name] for each in fields(Request)})
     options = Options(seed, jobs, overwrite=overwrite, resume=resume)
     place = None if out is None else Path(out)
-    return requested(model, request, place, options, Progress() if progress is None else progress)
+    return requested(model, request, place, options)
 
 
 def _limits(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, cast
 
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported, stage
 from designer.base.units import format_quantity
 from designer.verbs.console import say, table
 from designer.verbs.declared import Verb, option
 
 if TYPE_CHECKING:
+    from designer.answers.catalog_answer import CatalogNames, FigureCheckRow, OpAmpChecks
     from designer.catalog.parts_catalog import Catalog
     from designer.spice.opamp_check import FigureCheck
 
@@ -34,14 +35,20 @@ class CatalogAnswer:
     """Its figures, by the catalogue and by its model in ngspice."""
 
     @property
-    def answer(self) -> Mapping[str, Any]:
+    def answer(self) -> CatalogNames | OpAmpChecks:
         """The JSON object (docs/contract.md)."""
-        names = {kind: [entry.name for entry in getattr(self.entries, kind)] for kind in KINDS}
-        rows = [{**asdict(figure), "agrees": figure.agrees} for figure in self.figures]
-        found = names if self.opamp is None else {"opamp": self.opamp, "checks": rows}
-        return {"format": 1, **found, "hash": self.entries.hash}
+        own = self.entries.hash
+        if self.opamp is None:
+            names = {kind: [entry.name for entry in getattr(self.entries, kind)] for kind in KINDS}
+            return cast("CatalogNames", {"format": 1, **names, "hash": own})
+        rows = [
+            cast("FigureCheckRow", {**asdict(figure), "agrees": figure.agrees})
+            for figure in self.figures
+        ]
+        return {"format": 1, "opamp": self.opamp, "checks": rows, "hash": own}
 
 
+@reported
 def catalog(
     check: Annotated[
         str | None, option("--check", "NAME", "Measure this op-amp's model against its figures.")
@@ -64,8 +71,7 @@ def catalog(
     from designer.spice.opamp_check import checks
 
     opamp = entries.opamp(check)
-    if progress is not None:
-        progress.stage(f"{check} in ngspice")
+    stage(f"{check} in ngspice")
     return CatalogAnswer(entries, check, tuple(checks(opamp)))
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 from designer.base.defaults import SAMPLES, SEED
-from designer.base.progress import Progress, quiet
+from designer.base.progress import Progress, quiet, reported, watched
 from designer.verbs.declared import Jobs, Overwrite, Samples, Seed, Source, Verb, option
 
 
+@reported
 def explore(
     model: Source,
     *,
@@ -52,14 +53,13 @@ def explore(
     """
     from designer.folders.model_source import model_of
 
-    progress = Progress() if progress is None else progress
     modelfile = model_of(model)
     if save is not None:
         from designer.explorer.saved_page import save_page
         from designer.jobs.options import Options
 
         options = Options(seed, jobs, SAMPLES if samples is None else samples, overwrite)
-        save_page(modelfile, Path(save), options, progress)
+        save_page(modelfile, Path(save), options)
         return
     from designer.explorer import server
 
@@ -70,7 +70,7 @@ def explore(
         token=token,
         browser=browser,
         ready=ready,
-        progress=progress,
+        progress=watched(),
     )
 
 

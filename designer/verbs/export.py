@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from designer.base.defaults import Dialect
 from designer.base.errors import InputError
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported
 from designer.verbs.console import say
 from designer.verbs.declared import Out, Overwrite, Resume, Source, Verb, option
 from designer.verbs.tables import files
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from designer.jobs.export_job import ExportResult
 
 
+@reported
 def export(
     model: Source,
     out: Out = None,
@@ -106,7 +107,6 @@ def export(
     from designer.routing.board_copper import INNER
 
     options = Options(overwrite=overwrite, resume=resume)
-    progress = Progress() if progress is None else progress
     if deck and fab:
         raise InputError(None, "--fab", ", ".join(fab), "no --deck beside it: one after the other")
     only = (("--board", board), ("--parts", parts), ("--accept", ", ".join(accept) or None))
@@ -124,7 +124,7 @@ def export(
     if dsn is not None and (routed or deck or fab):
         raise InputError(None, "--dsn", "with another", "one after the other")
     modelfile, folder = source(model, out)
-    job = export_job.Export(modelfile, folder, options, progress)
+    job = export_job.Export(modelfile, folder, options)
     if routed:
         return job.routed(keep, _path(session), layers)
     if dsn is not None:

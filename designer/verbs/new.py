@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from designer.base.errors import InputError
 from designer.base.printed import tell
 from designer.verbs import next_steps
 from designer.verbs.declared import Verb, argument, option
+
+if TYPE_CHECKING:
+    from designer.answers.catalog_answer import NewAnswer
 
 
 def new(
@@ -60,7 +62,7 @@ def _files(path: Path) -> list[str]:
     return [str(path), *([str(schema)] if commented else [])]
 
 
-def printed(path: Path) -> Mapping[str, Any]:
+def printed(path: Path) -> NewAnswer:
     """The JSON object (docs/contract.md)."""
     return {"format": 1, "files": _files(path)}
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from designer.base.defaults import check_count, cores
 from designer.base.errors import InputError
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported
 from designer.verbs.declared import Jobs, Resume, Verb, argument, option
 
 PaperPart = Literal["dynamics", "circuit", "tolerance"]
@@ -19,6 +19,7 @@ PLACES: dict[PaperPart, Path] = {
 """Where the reports go if nothing is said."""
 
 
+@reported
 def reproduce(
     what: Annotated[
         PaperPart,
@@ -65,16 +66,15 @@ def reproduce(
     if what == "dynamics":
         if resume:
             raise InputError(None, "--resume", "given", "nothing: dynamics is made anew each time")
-        reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
+        reproduce_dynamics.reproduce(place, jobs=jobs or cores())
     elif what == "circuit":
-        reproduce_circuit.reproduce(place, jobs=jobs, progress=progress, resume=resume)
+        reproduce_circuit.reproduce(place, jobs=jobs, resume=resume)
     else:
         reproduce_tolerance.reproduce(
             place,
             samples=reproduce_tolerance.SAMPLES if samples is None else samples,
             seed=reproduce_tolerance.SEED if seed is None else seed,
             jobs=jobs,
-            progress=progress,
             resume=resume,
         )
     return place

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.progress import Progress
+from designer.base.progress import Progress, note, reported, stage, watched
 from designer.base.version import __version__
 from designer.verbs.console import say, table
 from designer.verbs.declared import DesignDir, Verb, option
@@ -53,6 +53,7 @@ class RulesResult:
         return table_html(self.answer["title"], rows, counts)
 
 
+@reported
 def rules(
     folder: DesignDir,
     *,
@@ -100,7 +101,6 @@ def rules(
 
     began, path = time.perf_counter(), Path(folder)
     report = None if junit is None else Path(junit)
-    progress = Progress() if progress is None else progress
     if not is_design_folder(path):
         expected = "a design folder, as synthesise and run make it"
         raise InputError(path, "DIR", "no manifest.json", expected)
@@ -111,9 +111,9 @@ def rules(
     if fab and board is None:
         raise InputError(None, "--fab", ", ".join(fab), "a board to hold against it: --board FILE")
     fabs(fab, catalog.folders)
-    synthesis = read_design(path, catalog, progress)
+    synthesis = read_design(path, catalog, watched())
     board_file = None if board is None else read_board(Path(board))
-    progress.stage("rules")
+    stage("rules")
     checks = checked(synthesis, board_file, fab)
     inputs = {
         "model": synthesis.modelfile.sha256,
@@ -134,9 +134,9 @@ def rules(
     try:
         with place.working(stages):
             place.write(NAME, dumps(answer))
-        renew_report(place, progress.note)
+        renew_report(place)
     except NotWritten as why:
-        progress.note(f"the answer is not stored: {why}")
+        note(f"the answer is not stored: {why}")
         answer["not_stored"] = str(why)
     if report is not None:
         text = rule_reports.junit(synthesis.modelfile.title, checks.outcomes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Progress, Show, quiet, reported
 from designer.verbs import next_steps
 from designer.verbs.declared import (
     Blame,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from designer.jobs.job_outcome import JobOutcome
 
 
+@reported
 def run(
     model: Source,
     out: Out = None,
@@ -75,7 +76,7 @@ def run(
         **stated_options(words),
     )
     return design_and_study(
-        model, out, options, words, VERB.command, progress, shown, catalog, whole_job=True
+        model, out, options, words, VERB.command, shown, catalog, whole_job=True
     )
 
 

@@ -8,23 +8,89 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from designer.answers.rare_words import boards_text
 from designer.base.defaults import SEARCH_SAMPLES, StudyEngine
 from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.printed import tell
-from designer.base.progress import Progress
+from designer.base.progress import Progress, note, reported, whole
+from designer.base.si_unit import drive_text
 from designer.verbs import next_steps
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Source, Verb, option
 from designer.verbs.tables import design_written, drive_cells, whole_job
 
 if TYPE_CHECKING:
-    from designer.answers.cure_answer import CureAnswer
+    from designer.answers.cure_answer import CureAnswer, MeasuredYieldRow, TrialRow
     from designer.answers.search_answer import ConfirmedCure, SearchAnswer
     from designer.jobs.job_outcome import JobOutcome
     from designer.jobs.options import Options
     from designer.jobs.repair_job import CureResult
     from designer.model.model_file import ModelFile
+
+
+def repair_text(answer: CureAnswer) -> str:
+    """The answer, yields before and after, rounds and the front, as lines of text.
+
+    answer : the JSON object of ``repair_json``.
+    """
+    percent = f"{100.0 * answer['target']:.8g} %"
+    digits = 4 if answer["target"] < 0.999 else 8
+    lines = []
+    if answer["reached"]:
+        lines.append(f"every response at {percent} or better for {answer['price']:.2f} euro:")
+        lines += [f"  {upgrade}" for upgrade in answer["said"]] or ["  nothing has to change"]
+    else:
+        lines.append(f"{percent} not reached: {answer['why']}")
+        best = "; ".join(answer["said"]) or "the design as it is"
+        lines.append(f"  best measured, {answer['price']:.2f} euro: {best}")
+    lines += ["", "response            before                  after", *_responses(answer)]
+    for number, trial in enumerate(answer["rounds"], start=1):
+        lines += ["", f"round {number}, {trial['price']:.2f} euro: " + _upgrades(trial)]
+        for r, (promised, m) in enumerate(
+            zip(trial["predicted"], trial["measured"], strict=True), start=1
+        ):
+            lines.append(f"  response {r}: promised {promised:.{digits}f}, measured {_yield(m)}")
+    lines += ["", "price     worst response          upgrades"]
+    for trial in answer["front"]:
+        worst = min(trial["measured"], key=lambda m: (_rate(m), m["low"]))
+        lines.append(f"{trial['price']:<9.2f} {_yield(worst):<23} {_upgrades(trial)}")
+    lines += [
+        "",
+        *(f"not built: {'; '.join(r['upgrades'])}: {r['why']}" for r in answer["refused"]),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _responses(answer: CureAnswer) -> list[str]:
+    out = []
+    for r in answer["responses"]:
+        place = drive_text(r["omega"], r.get("frequency_hz"))
+        name = f"{place} {r['expected'] or ''}".strip()
+        out.append(f"{name:<19} {_yield(r['before']):<23} {_yield(r['after'])}")
+        if r["limit"]:
+            out.append(f"    {r['limit']}")
+    return out
+
+
+def _upgrades(trial: TrialRow) -> str:
+    return "; ".join(trial["said"]) or "as it is"
+
+
+def _rate(m: MeasuredYieldRow) -> float:
+    return 0.0 if m["rate"] is None else float(m["rate"])
+
+
+def _yield(m: MeasuredYieldRow) -> str:
+    if m["rate"] is None:
+        return "not shown"
+    if rare := m.get("rare"):
+        shares = rare["lost"], rare["low"], rare["high"], rare["unseen"]
+        lost, low, high, unseen = (boards_text(1e6 * share) for share in shares)
+        return f"{lost} of a million lost ({low} to {high}; at most {unseen} that no search met)"
+    text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
+    return text + (f", {m['failed']} failed" if m["failed"] else "")
+
 
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Kinds of upgrades; as ``repair_branch.KINDS``."""
@@ -32,6 +98,7 @@ CURED = "cured"
 """Folder of the repaired design, in that of the search whose design is repaired."""
 
 
+@reported
 def search(
     model: Source,
     out: Out = None,
@@ -103,7 +170,6 @@ def search(
             jobs=jobs,
             overwrite=overwrite,
             resume=resume,
-            progress=progress,
         )
     from designer.folders.model_source import source
     from designer.jobs import folder_numbers, search_job, usual_times
@@ -130,21 +196,20 @@ def search(
     options = folder_numbers.of_search(folder, options, words)
     name = path if isinstance(path, Path) else path.source or folder / "model.toml"
     command = partial(VERB.command, model=name, out=place)
-    progress = Progress() if progress is None else progress
     usual = usual_times.SEARCH if repair is None else {**usual_times.SEARCH, **usual_times.REPAIRED}
-    with progress.whole(usual):
-        found = search_job.search_into(modelfile, folder, options, progress, command)
+    with whole(usual):
+        found = search_job.search_into(modelfile, folder, options, command)
         confirmed, stood = None, True
         if repair is None:
             cured = None
         else:
-            cured = repair(folder, out=folder / CURED, options=options, progress=progress)
+            cured = repair(folder, out=folder / CURED, options=options)
             if cured.reached:
                 confirm = search_job.confirmed_repair
-                confirmed, stood = confirm(folder / CURED, options, progress)
+                confirmed, stood = confirm(folder / CURED, options)
     is_another_s = not found.reused if cured is None else not cured.reached
     if is_another_s and (folder / CURED / DESIGN).exists():
-        progress.note(f"{folder / CURED} holds an earlier design, which is not of this search")
+        note(f"{folder / CURED} holds an earlier design, which is not of this search")
     if cured is None:
         return found
     repaired = {**cured.answer, "confirmation": confirmed}
@@ -195,13 +260,7 @@ def show(result: JobOutcome | CureResult) -> None:
     if isinstance(result, JobOutcome):
         design_written(result, result.answer, tables, _after)
     else:
-        _show_repair(result.answer)
-
-
-def _show_repair(repair: CureAnswer) -> None:
-    from designer.centering import repair_table
-
-    tell(repair_table.text(repair))
+        tell(repair_text(result.answer))
 
 
 def _after(folder: Path, answer: SearchAnswer) -> Iterator[next_steps.Step]:
@@ -252,7 +311,7 @@ def tables(answer: SearchAnswer) -> None:
         )
     if "cure" in answer:
         say("")
-        _show_repair(answer["cure"])
+        tell(repair_text(answer["cure"]))
         _show_confirmation(answer["cure"])
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from designer.base.defaults import DRAWN_STARTS, SEED, Fidelity
 from designer.base.errors import InputError
 from designer.base.frames import frame
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported, stage, watched
 from designer.base.si_unit import DIGITS, value_text
 from designer.verbs.console import say, table
 from designer.verbs.declared import Jobs, Seed, Source, Verb, option
@@ -78,6 +78,7 @@ class SimulationResult:
         return "".join(s._repr_html_() for s in self.simulated)
 
 
+@reported
 def simulate(
     model: Source,
     omega: Annotated[
@@ -152,7 +153,6 @@ def simulate(
     from designer.model.si_units import Reader, units_of
 
     Options(seed, jobs).check()
-    progress = Progress() if progress is None else progress
     began, catalog = time.perf_counter(), load_catalog()
     synthesis: Synthesis | None = None
     path = None if isinstance(model, ModelFile) else Path(model)
@@ -160,7 +160,7 @@ def simulate(
     if path is not None and path.is_dir() and engine != "model":
         from designer.folders.design_source import read_design
 
-        synthesis = read_design(path, catalog, progress)
+        synthesis = read_design(path, catalog, watched())
     read = Reader(modelfile.model, modelfile.si)
     omegas = tuple(read.value("--omega", "omega", w) for w in _several("omega", omega, "0.85"))
     frequencies = _several("frequency", frequency, "'10 Hz'")
@@ -184,7 +184,6 @@ def simulate(
         engine=engine,
         synthesis=synthesis,
         jobs=jobs,
-        progress=progress,
         traces=place is not None,
         fidelity=rung,
         starts=starts,
@@ -198,7 +197,7 @@ def simulate(
     seconds = time.perf_counter() - began
     answer = simulate_json(simulated, engine, origin, seconds, modelfile.si)
     if place is not None:
-        progress.stage("pictures")
+        stage("pictures")
         units = units_of(modelfile.si, modelfile.model)
         answer["files"] = simulate_plots.write(place, names, simulated, overwrite, units)
     return SimulationResult(plain(answer), simulated, path, place)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from designer.base.defaults import SEED, cores
 from designer.base.errors import InputError
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Progress, Show, quiet, reported, whole
 from designer.verbs import next_steps
 from designer.verbs.console import grid, say
 from designer.verbs.declared import Jobs, Out, Overwrite, Resume, Seed, Source, Verb, option
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from designer.model.model_file import ModelFile
 
 
+@reported
 def synthesise(
     model: Source,
     out: Out = None,
@@ -58,7 +59,6 @@ def synthesise(
         from designer.folders.model_source import source
         from designer.model.model_file import ModelFile, read_model_file
 
-        progress = Progress() if progress is None else progress
         folder: Path | None = None
         in_memory = isinstance(model, ModelFile) or (compare and not Path(model).is_dir())
         if out is None and in_memory:
@@ -71,16 +71,13 @@ def synthesise(
         from designer.jobs.open_design import design_file
 
         if folder is None:
-            return synthesise_job.synthesise_in_memory(
-                modelfile, catalog, compare, options.workers, progress
-            )
-        with progress.whole(usual_times.of_design(modelfile)):
-            chosen = design_file(modelfile, folder, options, progress)
+            return synthesise_job.synthesise_in_memory(modelfile, catalog, compare, options.workers)
+        with whole(usual_times.of_design(modelfile)):
+            chosen = design_file(modelfile, folder, options)
             return synthesise_job.synthesise_into(
                 chosen,
                 folder,
                 options,
-                progress,
                 shown,
                 compare=compare,
                 ahead=ahead if chosen is modelfile else None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 from designer.base.defaults import Over, StudyEngine
 from designer.base.errors import InputError
-from designer.base.progress import Progress, Show, quiet
+from designer.base.progress import Progress, Show, quiet, reported
 from designer.verbs import next_steps, tables
 from designer.verbs.declared import (
     Blame,
@@ -49,6 +49,7 @@ STUDY_KEYS = (
 """The keys of a study's JSON object that are printed, in their order."""
 
 
+@reported
 def tolerance(
     model: Annotated[
         Path | str | ModelFile | Synthesis | JobOutcome,
@@ -133,7 +134,7 @@ def tolerance(
         **stated_options(words),
     )
     if measured is None:
-        return design_and_study(model, out, options, words, VERB.command, progress, shown)
+        return design_and_study(model, out, options, words, VERB.command, shown)
     options.check()
     for name, value in (
         ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_)),
@@ -149,8 +150,7 @@ def tolerance(
     options = folder_numbers.of_measured(path, options, words)
     # The boards of the list are the samples.
     command = partial(VERB.command, model=path, out=None, without=("samples",))
-    progress = Progress() if progress is None else progress
-    return measured_into(path, Path(measured), options, progress, command, shown)
+    return measured_into(path, Path(measured), options, command, shown)
 
 
 def printed(result: JobOutcome) -> StudyAnswer:

@@ -10,7 +10,7 @@ from designer.base.defaults import SEED, TRADE_BOARDS, check_count
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
 from designer.base.printed import tell
-from designer.base.progress import Progress
+from designer.base.progress import Progress, reported
 from designer.verbs.declared import Jobs, Out, Overwrite, OwnSeed, Resume, Source, Verb, option
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class TradeResult:
         return table_html("The cheapest rung for each question", rows)
 
 
+@reported
 def trade(
     model: Source,
     out: Out = None,
@@ -113,8 +114,7 @@ def trade(
     extent = trade_job.TradeExtent(boards=numbers["boards"], truth=numbers["truth"])
     if extent.truth == VENDOR:
         _need_vendor_model(modelfile)
-    progress = Progress() if progress is None else progress
-    return TradeResult(*trade_job.answer(modelfile, folder, options, extent, progress))
+    return TradeResult(*trade_job.answer(modelfile, folder, options, extent))
 
 
 def _need_vendor_model(modelfile: ModelFile) -> None:

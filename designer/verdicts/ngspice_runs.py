@@ -77,7 +77,6 @@ class Query:
     subject: GateSubject
     """The response and the board that is run."""
     settings: SolverSettings
-    """Settings of ngspice."""
     expected: str
     """Response of the exact circuit."""
     refinements: int = OWN_REFINEMENTS

@@ -118,7 +118,6 @@ class StudyPlan:
     """Everything that decides a study's samples; equal plans give equal answers."""
 
     circuit: Circuit
-    """The nominal circuit."""
     spread: Spread
     """What varies from board to board."""
     seed: int

@@ -130,14 +130,9 @@ def _signed(change: float) -> str:
     return f"{100.0 * change:+.2g} %"
 
 
-def advise(
-    fit: BoardFit, questions: Sequence[Question], bands: Bands, *, seed: int = 0
-) -> tuple[Advice, ...]:
-    """What to do for each wanted response on the board of a fit, within the bands.
-
-    seed : of the boards drawn from what the records leave open.
-    """
-    boards = fit.prior.ensemble(fit.samples(SAMPLES, seed))
+def advise(fit: BoardFit, questions: Sequence[Question], bands: Bands) -> tuple[Advice, ...]:
+    """What to do for each wanted response on the board of a fit, within the bands."""
+    boards = fit.prior.ensemble(fit.samples(SAMPLES, 0))
     return tuple(_Advisor(fit, boards, question, bands).advice() for question in questions)
 
 

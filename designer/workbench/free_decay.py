@@ -94,7 +94,6 @@ def recorded_decay(
     record: Record,
     channels: Mapping[str, str],
     prediction: BoardPrediction,
-    scope: ScopeErrors | None = None,
 ) -> FreeDecay:
     """The free part of a record that begins while the generator is on, or just after.
 
@@ -107,7 +106,6 @@ def recorded_decay(
     InputError : no displacement or not every dead zone's output is among the channels; what is left
         after the last contact is too short or too faint; or the board comes to rest on a stop.
     """
-    scope = ScopeErrors() if scope is None else scope
     named = {net: record.signals.get(channel) for net, channel in channels.items()}
     signals = {net: signal for net, signal in named.items() if signal is not None}
     outputs = [stop.output for stop in prediction.stops]
@@ -146,7 +144,7 @@ def recorded_decay(
     cells = CELLS * max(lasts / slowest, 1.0)
     sigma = np.sqrt(
         np.array([noise[net] for net in nets]) ** 2 / width
-        + (scope.model * peak) ** 2 * count / cells
+        + (ScopeErrors().model * peak) ** 2 * count / cells
     )
     times = time[free][: count * width].reshape(count, width).mean(axis=1) - begin
     return FreeDecay(times, kept, sigma)

@@ -84,7 +84,6 @@ def observe(
     motion: RecordedMotion,
     nets: Sequence[str],
     excitation: Excitation | None = None,
-    scope: ScopeErrors | None = None,
     n: int | None = None,
 ) -> Observation:
     """What a record says of these nets, those of them that were recorded.
@@ -98,7 +97,7 @@ def observe(
     InputError : none of the nets was recorded in full, for a channel that is cut off says nothing;
         or the amplitude is neither given nor recorded.
     """
-    scope = ScopeErrors() if scope is None else scope
+    scope = ScopeErrors()
     cut = motion.record.clipped
     there = tuple(net for net in nets if motion.has(net) and motion.channels[net] not in cut)
     source = motion.record.source

@@ -50,7 +50,6 @@ class PredictedStop:
     """The stage of a clearance, or of another dead zone, as the nominal board has it."""
 
     clearance: str
-    """Its name."""
     output: str
     """Net of its output."""
     displacement: Mapping[str, float]

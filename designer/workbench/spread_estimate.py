@@ -125,7 +125,7 @@ def _interval(kind: str, square: float, told: float) -> KindSpread:
                       told)  # fmt: skip
 
 
-def measured_list(fits: Mapping[str, BoardFit], draws: int = 1, seed: int = 0) -> str:
+def measured_list(fits: Mapping[str, BoardFit], draws: int = 1) -> str:
     """The fitted boards as a list of measured values, which ``designer tolerance --measured``
     takes (docs/spread.md).
 
@@ -141,7 +141,7 @@ def measured_list(fits: Mapping[str, BoardFit], draws: int = 1, seed: int = 0) -
         raise InputError(None, "draws", draws, "1 or more")
     rows = []
     for name, fit in fits.items():
-        z = fit.samples(draws + 1, seed)
+        z = fit.samples(draws + 1, 0)
         z = z[:1] if draws == 1 else z[1:]
         for number, board in enumerate(_values(fit.prior, z), start=1):
             label = name if draws == 1 else f"{name} {number}"

@@ -205,19 +205,14 @@ def margins(
 
 
 def nominal_limits(
-    circuit: Circuit,
-    question: Question,
-    boards: Boards,
-    *,
-    jobs: int = 1,
-    progress: Callable[[], None] = lambda: None,
+    circuit: Circuit, question: Question, boards: Boards, *, jobs: int = 1
 ) -> Margin:
     """Every linear limit of the nominal board that is considered, the nearest first. boards : drawn
     of the spread, for the standard deviations."""
     differing = quantities(circuit, boards)
     nominal = replace(Boards.of(circuit, [nominal_board(circuit)]), bandwidth=boards.bandwidth)
     base, probes = _Base(nominal, question, question.start), _probes(nominal, differing)
-    return Margin(differing, _nominal_limits(base, probes, differing, boards, jobs, progress))
+    return Margin(differing, _nominal_limits(base, probes, differing, boards, jobs, lambda: None))
 
 
 def lost_boards(

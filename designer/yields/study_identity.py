@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from designer.base.plain_json import plain
+from designer.base.seal import json_hash
 from designer.base.version import __version__
 from designer.circuit.netlist import Part
 from designer.verdicts import cross_check, ngspice_runs
@@ -67,7 +66,7 @@ def study_hash(
                 for q in plan.questions
             ],
         }
-    return _hash(inputs)
+    return json_hash(inputs)
 
 
 def attribution_hash(plan: StudyPlan) -> str:
@@ -80,7 +79,7 @@ def checks_hash(design: str | None, ngspice: str | None) -> str:
 
     design : hash of ``design.json``. ngspice : its version.
     """
-    return _hash([__version__, RULES["checks"], design, ngspice])
+    return json_hash([__version__, RULES["checks"], design, ngspice])
 
 
 def nine_digits(value: Any) -> Any:
@@ -90,10 +89,6 @@ def nine_digits(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: nine_digits(v) for key, v in value.items()}
     return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value
-
-
-def _hash(inputs: Any) -> str:
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode("ascii")).hexdigest()
 
 
 def _simulated(part: Part) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from designer.base import progress
 from designer.base.defaults import (
     SAMPLES as SAMPLES,
     SEED as SEED,
@@ -19,7 +20,7 @@ from designer.base.defaults import (
     cores,
 )
 from designer.base.errors import InputError
-from designer.base.progress import Laps, Progress
+from designer.base.progress import Laps
 from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
@@ -133,16 +134,14 @@ class Stores:
 def check(
     synthesis: Synthesis,
     pool: SpicePool | None,
-    progress: Progress | None = None,
     gates: Sequence[GateResult] | None = None,
 ) -> tuple[CheckedResponse, ...]:
     """Every response of a design on the exact circuit and, with a pool, in ngspice.
 
     gates : see ``checked_design.check``.
     """
-    stage = (Progress() if progress is None else progress).stage
     return checked_design.check(
-        synthesis.design, synthesis.model_responses, pool, stage, gates=gates
+        synthesis.design, synthesis.model_responses, pool, progress.stage, gates=gates
     )
 
 
@@ -164,7 +163,6 @@ def tolerance(
     checked: tuple[CheckedResponse, ...] | None = None,
     stores: Stores | None = None,
     runner: Runner | None = None,
-    progress: Progress | None = None,
     sampled: Callable[[Study], None] = lambda _: None,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
@@ -186,7 +184,6 @@ def tolerance(
     warm = None
     if "temperature" in maps:
         warm = warmed(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     check_count("--samples", samples, 1)
     check_seed(seed)
@@ -194,7 +191,7 @@ def tolerance(
     if rare:
         need_drawn_boards(synthesis.modelfile)
     pool = None if fidelity == "exact" else pool
-    checked = check(synthesis, pool, progress) if checked is None else checked
+    checked = check(synthesis, pool) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     indices = tuple(i for i in range(len(checked)) if i not in left_out)
     plan = plan_study(
@@ -230,7 +227,6 @@ def tolerance(
         pool,
         Stores() if stores is None else stores,
         layers.LocalRunner(jobs) if runner is None else runner,
-        progress,
         fidelity,
         attribution_budget,
     )
@@ -294,8 +290,6 @@ class StudyWork:
     """Where rows are kept."""
     runner: Runner
     """Who computes blocks."""
-    progress: Progress
-    """Is told how far the work is."""
     engine: StudyEngine
     """Which engine decides."""
     attribution_budget: int = BUDGET
@@ -349,12 +343,12 @@ class StudyWork:
         """Whether every interval is; says which is not, and why there are no more samples."""
         silent = [i + 1 for i in study.response_indices if not _decided(study)[i]]
         if silent:
-            self.progress.note(
+            progress.note(
                 f"no board has an answer to response {', '.join(map(str, silent))}: "
                 "more samples would not narrow its interval"
             )
         if not _widest(study) < until:
-            self.progress.note(
+            progress.note(
                 f"the intervals are still wider than {until:g}, by what ngspice says: it is asked "
                 f"about {MOST_NOMINAL} boards of a response at most"
             )
@@ -385,7 +379,7 @@ class StudyWork:
         """The study with yields from power-up, by the recipes that the nominal circuit and a few
         boards suggest."""
         plan = study.plan
-        self.progress.stage("start recipes")
+        progress.stage("start recipes")
         recipes = find_recipes(plan, self.jobs)
 
         def task(block: range) -> Task:
@@ -403,7 +397,7 @@ class StudyWork:
             answers,
             budget=budget,
             jobs=self.jobs,
-            progress=self.progress.stage(
+            progress=progress.stage(
                 "blame, boards asked again", extent_of(plan, answers, budget).steps
             ),
             parts=self.stores.parts("attribution", plan),
@@ -423,7 +417,7 @@ class StudyWork:
             if result is None and counted is not None:
                 result = counted_losses(number, counted)
             if result is None:
-                step = self.progress.stage(f"boards where they are lost, response {index + 1}")
+                step = progress.stage(f"boards where they are lost, response {index + 1}")
                 log = AnswerLog(answers, name)
                 result = rare_losses(study.plan, number, jobs=self.jobs, progress=step, log=log)
                 parts.put({name: replace(result, seconds=0.0)})
@@ -446,7 +440,7 @@ class StudyWork:
                     name += f" {study_hash(replace(study.plan, spread=warm))}"
                 result = parts.get(name)
                 if result is None:
-                    step = self.progress.stage(f"yield map over {over}, response {index + 1}")
+                    step = progress.stage(f"yield map over {over}, response {index + 1}")
                     result = yield_map(
                         study.plan, number, over, b, warmed=warm, jobs=self.jobs, progress=step
                     )
@@ -464,7 +458,7 @@ class StudyWork:
         first: int = 0,
     ) -> tuple[Any, ...]:
         """The rows of a layer from sample ``first`` on, under a stage of this name."""
-        step = self.progress.stage(stage, (plan.samples - first) * len(plan.questions))
+        step = progress.stage(stage, (plan.samples - first) * len(plan.questions))
         store = self.stores.rows(layer, plan, more)
         size = layers.LAYERS[layer][1]
         return tuple(layers.fill(plan, store, size, task, self.runner, step, first))
@@ -495,7 +489,7 @@ class StudyWork:
         counts = cross_check.not_asked(wanted, asks, study.plan.questions)
         for index, count in zip(study.response_indices, counts, strict=True):
             if count:
-                self.progress.note(
+                progress.note(
                     f"response {index + 1}: {count} boards are not asked in ngspice, whose runs "
                     f"would take more than {nominal} × {cross_check.STEPS_EACH} steps together"
                 )
@@ -534,7 +528,7 @@ class StudyWork:
         old = f", {len(asks) - new} more are there" if new < len(asks) else ""
         step: layers.Step = _no_step
         if new:
-            step = self.progress.stage(f"boards in ngspice, {new} runs{old}", len(asks))
+            step = progress.stage(f"boards in ngspice, {new} runs{old}", len(asks))
         return tuple(
             layers.fill_cross_checks(
                 plan, asks, rows, self.pool, self.jobs, step, earlier=earlier, last=last

@@ -81,10 +81,6 @@ class Tuned(BoardRow):
     def setting(self) -> Adjustment:
         return Adjustment(self.frequency, self.amplitude, self.offset)
 
-    @property
-    def bench_setting(self) -> Adjustment:
-        return Adjustment(self.bench_frequency, self.bench_amplitude, self.bench_offset)
-
 
 def tuned_block(
     plan: StudyPlan,

@@ -45,7 +45,6 @@ class Index:
     """Sobol indices of the margin for one coordinate of the spread."""
 
     coordinate: str
-    """Name of the coordinate."""
     part: str
     """Name of the part that it belongs to."""
     first: float

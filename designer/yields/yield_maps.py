@@ -80,7 +80,6 @@ class YieldMap:
     question: int
     """Number of the question of the plan."""
     axes: tuple[Axis, ...]
-    """The axes of the grid."""
     there: NDArray[np.bool_]
     """Whether the nominal circuit shows the response, with the symmetry that is asked for."""
     ok: Counts

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from designer.base.errors import Unreachable
 from designer.base.page import Block, Picture, bullets, table
-from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_placement import place
@@ -38,9 +37,7 @@ COPIED = ("bom.csv", "circuit.cir", "setup.csv", "schematic.svg")
 TITLE = "On a board"
 
 
-def board_part(
-    model: Path, out: Path, note: str, samples: int, seed: int, jobs: int, progress: Progress
-) -> Evidence:
+def board_part(model: Path, out: Path, note: str, samples: int, seed: int, jobs: int) -> Evidence:
     """Take the file to a board in the folder ``design`` of the report; finished work is kept.
 
     note : what of the example the board shows, and what it cannot.
@@ -51,13 +48,11 @@ def board_part(
     """
     folder = out / FOLDER
     try:
-        outcome = run(
-            model, folder, samples=samples, seed=seed, jobs=jobs, resume=True, progress=progress
-        )
+        outcome = run(model, folder, samples=samples, seed=seed, jobs=jobs, resume=True)
     except Unreachable as error:
         return Evidence(TITLE, [note, f"No circuit was found. {error}"])
-    export(folder, resume=True, progress=progress)
-    checked = rules(folder, progress=progress).answer
+    export(folder, resume=True)
+    checked = rules(folder).answer
     for name in COPIED:
         shutil.copyfile(folder / name, out / name)
     portraits = _portraits(outcome.synthesis)

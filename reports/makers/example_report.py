@@ -19,12 +19,12 @@ from markupsafe import Markup
 
 from designer.base.defaults import cores
 from designer.base.page import Block, Page, PageSection, Verbatim
-from designer.base.progress import Progress
+from designer.base.progress import stage
 from designer.catalog.parts_catalog import load_catalog
 from designer.folders.origin import provenance
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
-from designer.paper.report_files import make_report, write_files
+from designer.paper.report_files import write_files
 from designer.plots import system_drawing
 from designer.plots.system_equations import equations_of, number_of
 from reports.makers import (
@@ -43,6 +43,7 @@ from reports.makers import (
 from reports.makers.board_part import board_part
 from reports.makers.evidence import Evidence, Example, figure_block
 from reports.makers.frequency_sweep import frequency_sweep
+from reports.makers.make_report import make_report
 
 FORMAT = 1
 SAMPLES, SEED = 100, 71
@@ -75,7 +76,6 @@ def report(
     seed: int = SEED,
     jobs: int | None = None,
     circuit: bool = True,
-    progress: Progress | None = None,
 ) -> None:
     """Make the report in the folder ``out``.
 
@@ -85,16 +85,15 @@ def report(
     ------
     InputError, Unreachable, EnvironmentMissing : as the verbs ``run``, ``export`` and ``rules``.
     """
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     file = read_model_file(model)
     example = EXAMPLES.get(model.stem, OTHER)
-    progress.stage("what the system shows", None)
+    stage("what the system shows", None)
     parts = [_system(file), *example.show(file), frequency_sweep(file, jobs)]
     parts[0] = replace(parts[0], blocks=[*parts[0].blocks, example.see])
     numbers = {"samples": samples, "seed": seed, "circuit": circuit}
     if circuit:
-        parts.append(board_part(model, out, example.board, samples, seed, jobs, progress))
+        parts.append(board_part(model, out, example.board, samples, seed, jobs))
     out.mkdir(parents=True, exist_ok=True)
     document = {
         "format": FORMAT,

@@ -22,7 +22,7 @@ from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import read_json
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress
+from designer.base.progress import note, stage
 from designer.base.report_pieces import CaseStore
 from designer.base.toml_reader import parse_toml
 from designer.base.toml_writer import toml_text
@@ -40,7 +40,7 @@ from designer.jobs.search_stage import RULES as SEARCH_RULES
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
-from designer.paper.report_files import README, make_report, write_files
+from designer.paper.report_files import README, write_files
 from designer.paper.reproduce_tolerance import TITLES, cases
 from designer.report import comparison
 from designer.verbs.search import VERB
@@ -52,6 +52,7 @@ from designer.yields.study import Study
 from designer.yields.study_plan import plan_study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.yield_count import Yield, all_on_one, count
+from reports.makers.make_report import make_report
 from reports.makers.robust_design_page import lever_chart, robust_design_page, yield_chart
 
 FORMAT = 1
@@ -77,7 +78,6 @@ def report(
     short: int = SHORT,
     seed: int = SEED,
     jobs: int | None = None,
-    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Make the report in the folder ``out``; finished cases that are there are not made again.
 
@@ -85,13 +85,12 @@ def report(
     ------
     InputError, Unreachable, EnvironmentMissing : as of a search.
     """
-    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     catalog, file = load_catalog(), read_model_file(model)
     options = Options(seed, jobs, samples, resume=True)
     rules = [__version__, SEARCH_RULES, study_identity.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
-    store = CaseStore(out, FILES, resume=True, place="out", note=progress.note)
+    store = CaseStore(out, FILES, resume=True, place="out", note=note)
     store.expect(dumps(settings, indent=None))
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -101,8 +100,8 @@ def report(
     def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
         place = out / name
         command = partial(VERB.command, model=model, out=place)
-        outcome = search_into(asked, place, options, progress, command)
-        row = _searched(_load(place, catalog), place, options, short, progress, tuned=tuned)
+        outcome = search_into(asked, place, options, command)
+        row = _searched(_load(place, catalog), place, options, short, tuned=tuned)
         return {**row, "confirmation": outcome.answer["confirmation"]}
 
     def nominal() -> dict[str, Any]:
@@ -114,7 +113,7 @@ def report(
         if other.reference:
             spec = model_file().circuit
             title = TITLES[other.circuit]
-            make = partial(_as_built, other.plan, spec, catalog, jobs, progress)
+            make = partial(_as_built, other.plan, spec, catalog, jobs)
             pieces.append(case(title, make))
     free = partial(searched, "free", file, tuned=False)
     pieces += [case(FREE, free), case(NOMINAL, nominal)]
@@ -149,7 +148,6 @@ def _searched(
     place: Path,
     options: Options,
     short: int,
-    progress: Progress,
     *,
     tuned: bool,
 ) -> dict[str, Any]:
@@ -165,7 +163,7 @@ def _searched(
         samples=options.samples,
         seed=options.seed,
     )
-    row = _as_built(plan, synthesis.modelfile.circuit, synthesis.catalog, jobs, progress)
+    row = _as_built(plan, synthesis.modelfile.circuit, synthesis.catalog, jobs)
     powered = place / "powered-up"
     powered.mkdir(exist_ok=True)
     for boards in (short, MORE * short):
@@ -179,8 +177,7 @@ def _searched(
             seed=options.seed,
             jobs=jobs,
             checked=checked,
-            stores=FolderStores(powered, lambda: None, progress.note),
-            progress=progress,
+            stores=FolderStores(powered, lambda: None, note),
         )
         if _decided(study, len(checked)):
             break
@@ -207,16 +204,14 @@ def _decided(study: Study, responses: int) -> bool:
     return not any(low <= TARGET <= high for low, high in intervals)
 
 
-def _as_built(
-    plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, progress: Progress
-) -> dict[str, Any]:
+def _as_built(plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int) -> dict[str, Any]:
     """Yields, attribution, limits, price and parts of a circuit."""
-    step = progress.stage("boards as built", plan.samples * len(plan.questions))
+    step = stage("boards as built", plan.samples * len(plan.questions))
     answers = exact_circuit.block(plan, range(plan.samples), jobs, step)
     some = replace(plan, samples=min(plan.samples, ATTRIBUTED))
     first = answers[: some.samples * len(plan.questions)]
-    attributed = attribute(some, first, jobs=jobs, progress=progress.stage("blame")).responses
-    limits = limitings(some, first, jobs=jobs, progress=progress.stage("limits"))
+    attributed = attribute(some, first, jobs=jobs, progress=stage("blame")).responses
+    limits = limitings(some, first, jobs=jobs, progress=stage("limits"))
     rows = []
     for k, question in enumerate(plan.questions):
         counted = count([a for a in answers if a.question == k])

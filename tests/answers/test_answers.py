@@ -13,6 +13,7 @@ import pytest
 
 from designer.answers.bench_answer import BenchJson
 from designer.answers.bifurcation_answer import BifurcationAnswer
+from designer.answers.catalog_answer import CatalogNames, NewAnswer, OpAmpChecks
 from designer.answers.design_answer import DesignAnswer
 from designer.answers.export_answer import ExportJson
 from designer.answers.rules_answer import RulesJson
@@ -46,7 +47,17 @@ REPORTS = sorted(
 """Of versions since then, and before."""
 
 
-VERBS = ("simulate", "bifurcation", "synthesise", "tolerance", "search", "trade", "rules", "bench")
+VERBS = (
+    "simulate",
+    "bifurcation",
+    "synthesise",
+    "tolerance",
+    "search",
+    "trade",
+    "rules",
+    "bench",
+    "catalog",
+)
 
 
 def keys_of(text: str) -> set[str]:
@@ -99,6 +110,7 @@ def own_unit(key: str) -> str:
         # The counts' keys are statuses.
         ("rules", RulesJson | ExportJson, "fail not_run pass seconds", "export"),
         ("bench", BenchJson, "seconds", ""),
+        ("catalog", CatalogNames | OpAmpChecks | NewAnswer, "", "catalog new"),
     ],
     ids=lambda value: value if value in VERBS else "",
 )
@@ -146,5 +158,5 @@ def test_what_a_verb_prints_is_looked_at(
     assert "RulesJson" in capsys.readouterr().err
 
 
-def test_every_verb_has_a_type_or_is_known_to_have_none() -> None:
+def test_every_verb_has_a_type() -> None:
     assert OF_VERB.keys() == set(VERBS_OF_TOOL) - {"reproduce", "explore"}

@@ -218,8 +218,7 @@ def test_a_sealed_line(values: list[Any]) -> None:
     line = sealed_line(values).encode()
     assert read_line(line) == values
     for place in range(len(line)):
-        with pytest.raises(ValueError, match="seal"):
-            read_line(flipped(line, place, place % 8))
+        assert read_line(flipped(line, place, place % 8)) is None
 
 
 def test_a_file_without_lines_is_whole(tmp_path: Path) -> None:

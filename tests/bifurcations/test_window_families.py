@@ -11,7 +11,7 @@ import pytest
 
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import Sweep, SweepPlan, follow
-from designer.bifurcations.window_families import families
+from designer.bifurcations.window_ends import families
 from designer.dynamics.steady_state import TransientSettings
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject

@@ -87,7 +87,7 @@ def test_an_answer_that_cannot_be_is_made_again(tmp_path: Path, answer: object) 
     path = tmp_path / "file"
     fill(AnswerCache(path, "a"), [1])
     head, line = path.read_bytes().splitlines()
-    key, _ = read_line(line)
+    key, _ = read_line(line) or []
     path.write_bytes(head + b"\n" + sealed_line([key, answer]).encode() + b"\n")
     assert fill(AnswerCache(path, "a"), [1]) == [1]
     assert fill(AnswerCache(path, "a"), [1]) == []

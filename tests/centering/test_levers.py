@@ -9,7 +9,6 @@ from dataclasses import replace
 import pytest
 
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import Progress
 from designer.centering import levers
 from designer.centering.bandwidth_check import BANDWIDTH
 from designer.centering.candidate import ALIKE, GAIN, Candidate, FidelityOutcome, better
@@ -105,7 +104,7 @@ def test_what_is_better() -> None:
 def test_what_is_refused_is_refused_before_any_work() -> None:
     open_ = file('omega = "best"')
     with pytest.raises(InputError) as refused:
-        look(open_, catalog(), 1, Progress())
+        look(open_, catalog(), 1)
     assert refused.value.field == "response[1].expect"
 
 

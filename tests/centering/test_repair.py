@@ -21,10 +21,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from designer.base import progress
 from designer.base.defaults import StudyEngine
 from designer.base.errors import InputError
 from designer.base.figure_style import to_svg
-from designer.base.progress import Progress
+from designer.base.progress import Progress, report_to
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering import repair_measure, repair_search
 from designer.centering.repair_branch import RepairBranch
@@ -41,22 +42,21 @@ from designer.centering.repair_measure import (
 )
 from designer.centering.repair_milp import cheapest
 from designer.centering.repair_plots import front_chart
-from designer.centering.repair_result_json import repair_json
 from designer.centering.repair_search import find_repair
 from designer.centering.repair_slots import PartSlot, network_slots, part_slots, trimmer_slot
-from designer.centering.repair_table import text
 from designer.centering.repair_trial import Repair, Trial
 from designer.centering.repair_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.repair_ways import ResponseWay, best_place
 from designer.circuit.netlist import Circuit
 from designer.jobs import fidelity_choice
 from designer.jobs.options import Options
-from designer.jobs.repair_job import FEWEST_LOST, REPAIR, STUDIES, cure, repair_into
+from designer.jobs.repair_job import FEWEST_LOST, REPAIR, STUDIES, cure, repair_into, repair_json
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
+from designer.verbs.search import repair_text
 from designer.verdicts import exact_circuit
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields import stored_parts
@@ -185,7 +185,6 @@ def searched(
     picture: LinearModel | Callable[..., LinearModel],
     real: Any,
     budget: float | None = None,
-    progress: Progress | None = None,
     target: float = TARGET,
 ) -> Repair:
     """The search with this picture, where ``real`` is what studies measure."""
@@ -195,7 +194,7 @@ def searched(
     monkeypatch.setattr(repair_measure, "measure", real)  # as measure_all calls it
     monkeypatch.setattr(repair_search, "questions_of", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(repair_search, "branches", lambda *_: iter([branch()]))
-    return find_repair(one_response(), target, budget=budget, seed=1, jobs=1, progress=progress)
+    return find_repair(one_response(), target, budget=budget, seed=1, jobs=1)
 
 
 RARE_TARGET = 1.0 - 3e-4
@@ -242,7 +241,7 @@ def test_a_rare_loss_is_repaired_for_the_least_price(monkeypatch: pytest.MonkeyP
     ]
     program = seen.program({(0, 0, 0): 1.0}, {})
     assert found.best.price == pytest.approx(min(program.price((*p, 0)) for p in enough))
-    assert "of a million lost" in text(repair_json(found, NO_ORIGIN, 0.0))
+    assert "of a million lost" in repair_text(repair_json(found, NO_ORIGIN, 0.0))
 
 
 @pytest.mark.slow
@@ -258,7 +257,7 @@ def test_the_cheapest_repair_is_the_enumerated_one(
     assert found.best.price == pytest.approx(by_hand(real))
     worst = [t.worst.rate for t in found.front]
     assert worst == sorted(worst)
-    told = text(repair_json(found, NO_ORIGIN, 0.0))
+    told = repair_text(repair_json(found, NO_ORIGIN, 0.0))
     assert "every response at 97 % or better" in told
     assert "ω = " in told
     assert to_svg(front_chart(found)).startswith("<svg")
@@ -330,7 +329,7 @@ def test_what_boards_show_is_said_before_the_search_goes_on(
     heard = Progress()
     monkeypatch.setattr(heard, "note", said.append)
     with heard:
-        searched(monkeypatch, known_picture(60.0), truth(60.0), progress=heard)
+        searched(monkeypatch, known_picture(60.0), truth(60.0))
     (line,) = said
     assert re.fullmatch(r" *as it is: yield of each response: 1\.0000 \(0\.\d+ to 1\.0000\)", line)
 
@@ -489,8 +488,7 @@ def test_of_two_estimates_the_worse_one_decides(monkeypatch: pytest.MonkeyPatch)
     """A region of losses may be met by one of them alone."""
     search = object.__new__(repair_search._Search)
     search.target, notes = 1.0 - 1e-5, list[str]()
-    search.progress = Progress()
-    monkeypatch.setattr(search.progress, "note", notes.append)
+    monkeypatch.setattr(progress, "note", notes.append)
     counted = MeasuredYield(Yield(4000, 0, 0, 0), search.target)
     few, many = (RareShare(s, 0.5 * s, 2.0 * s, 1e-3, 9000) for s in (1e-6, 2e-5))
     lost = iter([0, 9])  # of the boards that are counted, in each of the cases below
@@ -700,8 +698,8 @@ def test_a_trade_that_sends_every_board_to_ngspice_is_told(
     choice = fidelity_choice.FidelityChoice(fidelity, "rung by trade.json: because")
     monkeypatch.setattr(fidelity_choice, "choose", lambda _: choice)
     said = _Notes()
-    with pytest.raises(_Stopped):
-        repair_into(folder, target=0.99, progress=said)
+    with pytest.raises(_Stopped), report_to(said):
+        repair_into(folder, target=0.99)
     assert len(said.notes) == told
     assert all(choice.reason in note for note in said.notes)
 
@@ -711,7 +709,7 @@ def test_a_design_is_repaired_and_its_repair_is_a_design(tmp_path: Path) -> None
     from designer.jobs.study_job import run_into
 
     design = tmp_path / "design"
-    synthesise_into(parse_model_file(SMALL), design, Options(), Progress())
+    synthesise_into(parse_model_file(SMALL), design, Options())
     other = Path(shutil.copytree(design, tmp_path / "stopped"))
     out = tmp_path / "cured"
     found = repair_into(design, target=0.99, without=WITHOUT, out=out)
@@ -722,8 +720,8 @@ def test_a_design_is_repaired_and_its_repair_is_a_design(tmp_path: Path) -> None
     assert answer["upgrades"]["grades"]
     assert answer["rounds"][-1]["measured"] == [response["after"]]
 
-    with pytest.raises(_Stopped):
-        repair_into(other, target=0.99, without=WITHOUT, progress=_Stops())
+    with pytest.raises(_Stopped), report_to(_Stops()):
+        repair_into(other, target=0.99, without=WITHOUT)
     with pytest.raises(InputError, match="unfinished"):
         repair_into(other, target=0.99, without=WITHOUT)
     repair_into(other, target=0.99, without=WITHOUT, options=Options(resume=True))
@@ -736,7 +734,7 @@ def test_a_design_is_repaired_and_its_repair_is_a_design(tmp_path: Path) -> None
     options = Options(seed=99, samples=400, rung="exact")
     modelfile = parse_model_file((out / "model.toml").read_text(encoding="utf-8"), out / "m.toml")
     modelfile = replace(modelfile, source=out / "model.toml")
-    yields = run_into(modelfile, out, options, Progress(), lambda _: "").answer["responses"]
+    yields = run_into(modelfile, out, options, lambda _: "").answer["responses"]
     # Another seed, so another draw of the same yield.
     assert yields[0]["yield"]["high"] > 0.99
     with (out / "bom.csv").open(encoding="utf-8", newline="") as bill:

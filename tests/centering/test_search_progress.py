@@ -65,7 +65,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Heard:
     start = made().model_responses[0].orbit.start
     windows = ((Stretch((OperatingPoint(0.85, 0.25, start),)),),)
     with heard:
-        design_search.search(asked, catalog(), windows=windows, progress=heard)
+        design_search.search(asked, catalog(), windows=windows)
     return heard
 
 

@@ -17,7 +17,7 @@ from designer.base.arrays import Array
 from designer.explorer.place import read_place
 from designer.explorer.response_view import facts, reached as reached_at
 from designer.folders import design_files
-from designer.laws.cubic_law import cubic_points
+from designer.laws.law_elements import cubic_points
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.verbs.bifurcation import show
 from designer.verbs.simulate import tables

@@ -20,9 +20,9 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.turning_points import heights
 from designer.model.driven import model_flow
+from designer.model.lumped_elements import Waveform, series
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.model.relative_motion import ground_of
-from designer.model.waveforms import Waveform, series
 from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 

@@ -27,8 +27,7 @@ from designer.kernels import kernel_algebra, kernel_orbit, kernel_sweep
 from designer.kernels.kernel_modal import CHANGE, WIDTH
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
-from designer.model.swept_model import ModelSubject
-from designer.model.swept_tables import ModalBatch
+from designer.model.swept_model import ModalBatch, ModelSubject
 from tests.dynamics.test_modal_tables import PAPER, cases
 from tests.shared.exploring import quick
 from tests.shared.oracles import Plain

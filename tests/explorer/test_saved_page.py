@@ -12,7 +12,6 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page
 
 from designer import InputError, explore, read_model_file
-from designer.base.progress import Progress
 from designer.explorer import saved_page, saved_page as branch_recording
 from designer.explorer.explorer_page import recorded_page
 from designer.explorer.place import ModelPlace
@@ -52,7 +51,7 @@ def modelfile() -> ModelFile:
 
 @pytest.fixture(scope="module")
 def branch(modelfile: ModelFile) -> BranchRecording:
-    return record(modelfile, OMEGAS, 1, Progress())
+    return record(modelfile, OMEGAS, 1)
 
 
 def test_a_recorded_view_is_that_of_the_live_page(
@@ -98,14 +97,14 @@ force = [{ on = "block", amplitude = 0.5 }]
 
 def test_a_window_without_impacts_is_as_symmetric_as_its_places() -> None:
     """One stop has no mirror, and what does not reach it is a sine all the same."""
-    recorded = record(parse_model_file(BLOCK), (0.4, 0.5, 0.6), 1, Progress())
+    recorded = record(parse_model_file(BLOCK), (0.4, 0.5, 0.6), 1)
     assert {view["summary"] for view in recorded.views} == {"1-0-0, symmetric"}
     assert [each.message()["summary"] for each in recorded.windows] == ["1-0-0, symmetric"]
 
 
 def test_a_page_shows_the_factor_of_gaps_of_the_first_response() -> None:
     nearer = f"{BLOCK}response = [{{ omega = 0.5, b = 0.1 }}]"  # the block moves by 0.65
-    recorded = record(parse_model_file(nearer), (0.4, 0.5, 0.6), 1, Progress())
+    recorded = record(parse_model_file(nearer), (0.4, 0.5, 0.6), 1)
     assert {view["summary"] for view in recorded.views} == {"1-1-0, asymmetric"}
     assert [each.message()["summary"] for each in recorded.windows] == ["1-1-0, asymmetric"]
 
@@ -128,7 +127,7 @@ def test_half_the_size_keeps_the_picture() -> None:
 
 def test_a_file_without_responses_says_why_it_has_no_yields(modelfile: ModelFile) -> None:
     bare = parse_model_file(f"format = 1\n{PAPER_TABLE}{COARSE_RECTIFIER}", None)
-    assert yields(bare, Options(samples=1), Progress()).words == "the model file wants no response"
+    assert yields(bare, Options(samples=1)).words == "the model file wants no response"
 
 
 @pytest.mark.parametrize("name", ["there.html", "nowhere/page.html"])
@@ -156,7 +155,7 @@ def rig_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A saved page with SI values, at four drive frequencies."""
     rig = read_model_file(EXAMPLES / "rig.toml")
     omegas = [2.0 * math.pi * hertz for hertz in (13.4, 13.6, 14.0, 14.2)]
-    message = message_of(record(rig, omegas, 1, Progress()), RecordedYields("none here"))
+    message = message_of(record(rig, omegas, 1), RecordedYields("none here"))
     path = tmp_path_factory.mktemp("rig") / "rig.html"
     path.write_text(recorded_page(rig, message), encoding="utf-8")
     return path

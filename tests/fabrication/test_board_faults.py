@@ -30,12 +30,11 @@ from designer.check.synthesis_result import synthesise
 from designer.design_rules import on_board, on_fab
 from designer.design_rules.kicad_drc import DesignRuleCheck, check
 from designer.fabrication.kicad_plot import plot
-from designer.fabrication.order import BoardOrder, FaultyOrder, order_files
-from designer.fabrication.order_check import _places
-from designer.fabrication.order_refusal import refusals
+from designer.fabrication.order import BoardOrder, FaultyOrder, _places, order_files
 from designer.folders import board_files
 from designer.folders.kicad_files import texts
 from designer.jobs.board_routing import board_file
+from designer.jobs.export_job import refusals
 from designer.model.model_file import read_model_file
 from designer.routing.routed_board import route_board
 from tests.shared.kicad_python import asked_of_pcbnew

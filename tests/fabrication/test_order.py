@@ -21,7 +21,7 @@ from designer.catalog.design_rules import BY_ID
 from designer.catalog.fab import fab_limits, fabs
 from designer.fabrication.kicad_plot import undated
 from designer.fabrication.order import BoardOrder, order_files, packed
-from designer.fabrication.order_refusal import accepted_failures, not_checked, refusals
+from designer.jobs.export_job import accepted_failures, not_checked, refusals
 from designer.routing.board_copper import with_layers
 from tests.shared.gerber_reader import flashes, holes
 from tests.shared.kicad_cases import case_files

@@ -20,7 +20,7 @@ from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
-from designer.base.progress import Progress
+from designer.base.progress import Progress, report_to
 from designer.base.si_unit import drive_text
 from designer.catalog.parts_catalog import load_catalog
 from designer.catalog.vendor_model import PINS, VendorModel
@@ -655,16 +655,17 @@ def test_what_was_asked_for_stands(tmp_path: Path, fidelity: Any) -> None:
     near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     folder = folder_with(tmp_path / "near", near)
     options = Options(rung=fidelity)
-    assert with_fidelity(folder, options, Progress()) is options
+    assert with_fidelity(folder, options) is options
     notes: list[str] = []
 
     class Heard(Progress):
         def note(self, text: str) -> None:
             notes.append(text)
 
-    assert with_fidelity(folder, Options(), Heard()).rung == "auto"
-    assert len(notes) == 1
-    assert with_fidelity(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
+    with report_to(Heard()):
+        assert with_fidelity(folder, Options()).rung == "auto"
+        assert len(notes) == 1
+        assert with_fidelity(Folder(tmp_path / "no"), Options()).rung == "auto"
     assert len(notes) == 1
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from designer.base.errors import InputError, Unreachable
-from designer.base.progress import Progress
 from designer.board.board_check import check_board
 from designer.catalog.entries import PartCase, mounting_of
 from designer.catalog.parts_catalog import Catalog, load_catalog
@@ -241,10 +240,10 @@ def test_a_search_leaves_out_what_the_rails_cannot_feed(monkeypatch: pytest.Monk
     monkeypatch.setattr(design_search, "stretches", lambda *_, **__: ())
     low = text('opamp = "MCP6004"\nsupply = 2.5')
     both = low + '\n[search]\ndead_zones = ["saturation", "rectifier"]\n'
-    assert design_search.look(parse_model_file(both), CATALOG, 1, Progress()) == ()
+    assert design_search.look(parse_model_file(both), CATALOG, 1) == ()
     alone = parse_model_file(low + '\n[search]\ndead_zones = ["rectifier"]\n')
     with pytest.raises(Unreachable, match=r"circuit\.reference"):
-        design_search.look(alone, CATALOG, 1, Progress())
+        design_search.look(alone, CATALOG, 1)
 
 
 def test_a_search_chooses_among_the_cases_that_the_board_takes(

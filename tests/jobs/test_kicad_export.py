@@ -232,7 +232,7 @@ def test_a_case_without_a_footprint_stops_the_export_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """synthesise goes on and says it; export says what is accepted."""
-    from designer.base.progress import Progress
+    from designer.base.progress import Progress, report_to
     from designer.jobs import synthesise_job
     from designer.jobs.export_job import Export
     from designer.jobs.options import Options
@@ -252,11 +252,12 @@ def test_a_case_without_a_footprint_stops_the_export_alone(
     model.write_text(MODEL, encoding="utf-8")
     monkeypatch.setattr(kicad_files, "files", unknown)
     notes = Notes()
-    synthesise_job.synthesise_into(read_model_file(model), tmp_path / "design", Options(), notes)
+    with report_to(notes):
+        synthesise_job.synthesise_into(read_model_file(model), tmp_path / "design", Options())
     assert any("no KiCad project" in n and "Other:QFN" in n for n in notes.notes)
     assert not (tmp_path / "design" / "kicad").exists()
     with pytest.raises(InputError, match="Other:QFN"):
-        Export(read_model_file(model), tmp_path / "design", Options(), notes).project()
+        Export(read_model_file(model), tmp_path / "design", Options()).project()
 
 
 def test_the_sheet_takes_the_gate_s_settings_unless_somebody_changed_it(

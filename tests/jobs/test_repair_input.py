@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.progress import Progress
+from designer.base.progress import Progress, report_to
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.repair_branch import KINDS, kind_named
 from designer.centering.repair_upgrade import Upgrades, upgraded_file
@@ -94,8 +94,8 @@ def test_kinds_by_either_name_are_the_same_inputs(design: Path, tmp_path: Path) 
     said = []
     for name in ("dead-zone", "dead zone"):
         folder = Path(shutil.copytree(design, tmp_path / name))
-        with pytest.raises(_Worked):
-            repair_into(folder, target=0.9, without=(name,), progress=_NoWork())
+        with pytest.raises(_Worked), report_to(_NoWork()):
+            repair_into(folder, target=0.9, without=(name,))
         manifest = json.loads((folder / "manifest.json").read_text())
         said.append(manifest["stages"]["cure"]["inputs"]["without"])
     assert said == [["dead zone"], ["dead zone"]]
@@ -107,17 +107,17 @@ def test_a_place_with_a_design_is_refused_before_the_work(
     other = Path(shutil.copytree(another, tmp_path / "other"))
     before = {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()}
     own = Path(shutil.copytree(design, tmp_path / "own"))
-    with pytest.raises(InputError) as refused:
-        repair_into(own, target=0.9, out=other, progress=_NoWork())
+    with pytest.raises(InputError) as refused, report_to(_NoWork()):
+        repair_into(own, target=0.9, out=other)
     assert refused.value.field == "--out"
     assert "cure" not in json.loads((own / "manifest.json").read_text())["stages"]
     assert {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()} == before
     # The user says that it may go, or the place is free: then work begins.
-    with pytest.raises(_Worked):
-        repair_into(own, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
+    with pytest.raises(_Worked), report_to(_NoWork()):
+        repair_into(own, target=0.9, out=other, options=Options(overwrite=True))
     third = Path(shutil.copytree(design, tmp_path / "third"))
-    with pytest.raises(_Worked):
-        repair_into(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
+    with pytest.raises(_Worked), report_to(_NoWork()):
+        repair_into(third, target=0.9, out=tmp_path / "free")
 
 
 def test_a_file_in_the_way_is_refused_before_the_work(
@@ -128,10 +128,8 @@ def test_a_file_in_the_way_is_refused_before_the_work(
     manifest = json.loads((other / "manifest.json").read_text())
     del manifest["files"]["setup.csv"]
     (other / "manifest.json").write_text(json.dumps(manifest))
-    with pytest.raises(InputError, match="does not list"):
-        repair_into(
-            design, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork()
-        )
+    with pytest.raises(InputError, match="does not list"), report_to(_NoWork()):
+        repair_into(design, target=0.9, out=other, options=Options(overwrite=True))
     assert "cure" not in json.loads((design / "manifest.json").read_text())["stages"]
 
 

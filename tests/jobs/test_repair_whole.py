@@ -13,7 +13,6 @@ import pytest
 
 from designer.answers.cure_answer import CureAnswer, CuredResponse
 from designer.base.design_folder import MODEL
-from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.repair_branch import KINDS, PLACE, TRIMMER
 from designer.centering.repair_measure import plan_of, questions_of
@@ -67,7 +66,7 @@ class Whole:
 def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     """The repair of this model file's design by this kind alone."""
     design, repaired = where / "design", where / "cured"
-    synthesise_into(parse_model_file(model), design, Options(), Progress())
+    synthesise_into(parse_model_file(model), design, Options())
     found = repair_into(design, target=target, without=set(KINDS) - {kind}, out=repaired)
     assert found.reached, found.answer["why"]
     check_type(found.answer, "search")
@@ -77,7 +76,7 @@ def whole(where: Path, model: str, kind: str, target: float) -> Whole:
 def studied(folder: Path, options: Options = FRESH) -> dict[str, Any]:
     """What the plain tolerance study says about a folder's one response."""
     modelfile = read_model_file(folder / MODEL)
-    answer = run_into(modelfile, folder, options, Progress(), lambda _: "").answer
+    answer = run_into(modelfile, folder, options, lambda _: "").answer
     (response,) = answer["responses"]
     return cast(dict[str, Any], response)
 

@@ -19,10 +19,9 @@ from designer.base.design_folder import MODEL, Folder
 from designer.base.errors import EnvironmentMissing, InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
-from designer.base.progress import Progress
+from designer.base.progress import Progress, report_to
 from designer.centering.answer_cache import AnswerCache
 from designer.centering.levers import DesignChoice
-from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
 from designer.jobs import fidelity_choice, search_job
@@ -30,7 +29,7 @@ from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.options import Options
 from designer.jobs.repair_job import CureResult
 from designer.jobs.search_job import confirms, search_into, to_confirm
-from designer.jobs.search_stage import searched_into
+from designer.jobs.search_stage import resolved, searched_into
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.verbs.search import KINDS
@@ -100,11 +99,11 @@ def test_the_final_study_takes_its_fidelity_by_a_trade_and_says_so(
 ) -> None:
     folder = Folder(tmp_path) if trade is None else with_trade(tmp_path, trade)
     heard = Heard()
-    assert fidelity_choice.for_search(folder, Options(), heard) == fidelity
-    assert word in heard.notes[0]
-    for asked_for in ("exact", "ngspice"):
-        options = Options(rung=asked_for)
-        assert fidelity_choice.for_search(folder, options, heard) == asked_for
+    with report_to(heard):
+        assert fidelity_choice.for_search(folder, Options()) == fidelity
+        assert word in heard.notes[0]
+        for asked_for in ("exact", "ngspice"):
+            assert fidelity_choice.for_search(folder, Options(rung=asked_for)) == asked_for
     assert len(heard.notes) == 1
 
 
@@ -216,9 +215,9 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     monkeypatch.setattr(f"{design}.write_last", lambda *_: None)
     monkeypatch.setattr(Folder, "begin", killed)
     with pytest.raises(KeyboardInterrupt):
-        searched_into(file, out, Options(jobs=1, overwrite=True), Progress())
+        searched_into(file, out, Options(jobs=1, overwrite=True))
     monkeypatch.setattr(Folder, "begin", begin)
-    final = searched_into(file, out, Options(jobs=1, resume=True), Progress())
+    final = searched_into(file, out, Options(jobs=1, resume=True))
     trade = read(out / "search.json")["trade"]
     assert (trade["rung"], trade["model"]) == ("ngspice", final.sha256)
     assert fidelity_choice.choose(Folder(out)).rung == "ngspice"
@@ -416,8 +415,8 @@ def test_the_design_of_a_search_is_cured_in_a_folder_of_its_own(
     model.write_text(asked(response, objective="match"), encoding="utf-8")
 
     def chosen(file: ModelFile, folder: Path, options: Options, *rest: Any) -> JobOutcome:
-        made_now = synthesise_into(file, folder, options, Progress())
-        commands.append(rest[1](options))
+        made_now = synthesise_into(file, folder, options)
+        commands.append(rest[0](options))
         return replace(made_now, answer=found, satisfied=True)
 
     commands: list[str] = []
@@ -558,7 +557,7 @@ def test_a_search_s_tables_are_for_its_end(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("designer.jobs.search_job.RANDOM", random)
     monkeypatch.setattr("designer.jobs.search_job.fidelity_choice.for_search", lambda *_: "exact")
     file: Any = None
-    found = search_into(file, tmp_path, Options(), Progress(), lambda _: "")
+    found = search_into(file, tmp_path, Options(), lambda _: "")
     assert found.satisfied
     assert not found.shown
     assert not found.reused  # the confirmation was made now

@@ -226,7 +226,7 @@ def test_no_stage_of_a_run_is_silent(tmp_path: Path) -> None:
     options, modelfile = Options(samples=2, jobs=2), parse_model_file(TEXT)
     usual = {**usual_times.of_design(modelfile), **usual_times.STUDIED}
     with Walk() as walk, walk.whole(usual):
-        study_job.run_into(modelfile, tmp_path / "out", options, walk, lambda _: "run")
+        study_job.run_into(modelfile, tmp_path / "out", options, lambda _: "run")
     assert list(walk.stages) == list(STAGES)
     assert [next(n for n in walk.stages if n.startswith(phase)) for phase in usual] == [
         name for name in walk.stages if name.startswith(tuple(usual))

@@ -14,8 +14,8 @@ from scipy.optimize import minimize
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.laws.cubic_law import cubic_error, cubic_points, points_for
 from designer.laws.force_law import ForceLaw
+from designer.laws.law_elements import cubic_error, cubic_points, points_for
 from designer.model.clearance import Side
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import SecondOrderSystem

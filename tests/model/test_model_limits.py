@@ -14,7 +14,7 @@ from designer.base.errors import InputError
 from designer.base.schema import FileTable, keys_of, nested_table
 from designer.base.toml_writer import toml_text
 from designer.model.model_file import FORMATS, parse_model_file
-from designer.model.model_limits import ELEMENTS, LIMITS, MODELS, WHERE, limits_table
+from designer.model.model_limits import ELEMENTS, LIMITS, MODELS, WHERE
 from tests.shared.mechanism_file import HAMMER
 from tests.shared.model_text import PAPER_TABLE
 
@@ -263,6 +263,16 @@ def test_whatever_keys_a_table_has_the_error_is_one_of_the_input(keys: dict[str,
         text = toml_text({"format": 1 + (table == "clearance"), table: keys})
         with pytest.raises(InputError):
             parse_model_file(text)
+
+
+def limits_table() -> list[str]:
+    """The rows of the table in docs/model-file.md."""
+    rows = []
+    for limit in LIMITS:
+        if limit.example:
+            formats = " and ".join(map(str, limit.formats))
+            rows.append(f"| {limit.feature} | {formats} | {limit.example} | {limit.nearest} |")
+    return rows
 
 
 def test_the_docs_have_the_limits() -> None:

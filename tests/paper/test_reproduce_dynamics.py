@@ -17,7 +17,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.progress import Progress
 from designer.base.report_pieces import check_report_folder
 from designer.bifurcations.doubling_cascade import cascade
 from designer.bifurcations.points import PointKind
@@ -57,7 +56,7 @@ DOCS = Path(__file__).parents[2] / "docs" / "bifurcations.md"
 
 @cache
 def small() -> Dynamics:
-    return measure(SMALL, Progress())
+    return measure(SMALL)
 
 
 def made(response: str, low: float, high: float, *, symmetric: bool = False) -> BranchWindow:

@@ -9,7 +9,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from designer.base.errors import InputError
-from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.paper import reproduce_tolerance
 from designer.paper.circuits import OMEGA
@@ -85,9 +84,7 @@ def test_it_goes_on_where_it_was_and_refuses_what_is_not_its_own(
         return real(case, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(reproduce_tolerance, "_case", counted)
-    again = reproduce(
-        out, samples=3, seed=4, jobs=1, only=TWO, short=1, resume=True, progress=Progress()
-    )
+    again = reproduce(out, samples=3, seed=4, jobs=1, only=TWO, short=1, resume=True)
     assert worked == [TWO[1]]
     assert again == rows
     redone = json.loads(lost.read_text(encoding="utf-8"))

@@ -17,7 +17,7 @@ from designer.model.ascii_sketch import sketch
 from designer.model.clearance import Sides
 from designer.model.model import Dimensionless, Mechanical
 from designer.plots.system_drawing import pair_drawing
-from designer.report.equations import (
+from designer.report.design_page import (
     dimensionless_equations,
     equations_with_numbers,
     mechanical_equations,

@@ -13,7 +13,6 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from designer.base.arrays import Array
-from designer.base.progress import Progress
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import read_model_file
 from reports.makers import (
@@ -113,9 +112,7 @@ def test_the_modes_of_a_chain() -> None:
 def test_a_report_without_a_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(frequency_sweep, "STEPS", 12)
     out = tmp_path / "new" / "three-masses"
-    example_report.report(
-        EXAMPLES / "three-masses.toml", out, circuit=False, jobs=1, progress=Progress()
-    )
+    example_report.report(EXAMPLES / "three-masses.toml", out, circuit=False, jobs=1)
     page = (out / "README.md").read_text("utf-8")
     assert "2√(K/M) sin((2k − 1)π/14)" in page
     assert page.startswith("# Three masses and two unequal clearances")
@@ -129,7 +126,7 @@ def test_a_report_with_a_board(tmp_path: Path) -> None:
     """The cheapest example: its circuit, 20 boards in both engines, the board, and the files that
     stand beside the page."""
     out = tmp_path / "shaw-holmes"
-    example_report.report(EXAMPLES / "shaw-holmes.toml", out, samples=20, progress=Progress())
+    example_report.report(EXAMPLES / "shaw-holmes.toml", out, samples=20)
     page = (out / "README.md").read_text("utf-8")
     for name in re.findall(r"\]\(([\w.-]+)\)", page):
         assert 200 < (out / name).stat().st_size < 150_000, name

@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from PIL import Image
 
-from designer.report.equations import dimensionless_equations
+from designer.report.design_page import dimensionless_equations
 from tests.dynamics.test_modal_tables import PAPER
 
 ROOT = Path(__file__).resolve().parents[2]

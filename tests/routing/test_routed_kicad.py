@@ -16,7 +16,7 @@ from designer.board.kicad_rules import CustomRule, board_rules
 from designer.catalog.design_rule import PASS
 from designer.design_rules import on_board
 from designer.fabrication.kicad_plot import plot
-from designer.fabrication.order_check import check_order
+from designer.fabrication.order import check_order
 from designer.fabrication.plotted_copper import plotted
 from designer.folders import board_files
 from designer.folders.kicad_files import texts

@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from designer.base.progress import Progress
 from designer.check.synthesis_result import Synthesis
 from designer.cli import entry
 from designer.folders import design_files
@@ -53,7 +52,7 @@ def _made(text: str, name: str) -> dict[str, bytes]:
     with TemporaryDirectory() as place, pytest.MonkeyPatch.context() as patched, blank_figures():
         without_starts(patched)
         out = Path(place) / name
-        synthesise_into(parse_model_file(text), out, Options(), Progress())
+        synthesise_into(parse_model_file(text), out, Options())
         return _files(out)
 
 

@@ -13,6 +13,7 @@ from typing_extensions import get_type_hints, is_typeddict
 
 from designer.answers.bench_answer import BenchJson
 from designer.answers.bifurcation_answer import BifurcationAnswer
+from designer.answers.catalog_answer import CatalogNames, NewAnswer, OpAmpChecks
 from designer.answers.cure_answer import CureAnswer
 from designer.answers.design_answer import DesignAnswer
 from designer.answers.export_answer import ExportJson
@@ -36,10 +37,10 @@ OF_VERB: dict[str, Any] = {
     "rules": RulesJson,
     "bench": BenchJson,
     "export": ExportJson,
-    "catalog": object,
-    "new": object,
+    "catalog": CatalogNames | OpAmpChecks,
+    "new": NewAnswer,
 }
-"""The type of what each verb prints; ``object``: it has none."""
+"""The type of what each verb prints."""
 NOT_FOUND = {"responses"}
 """Keys of what any verb prints where the model does not show a response."""
 

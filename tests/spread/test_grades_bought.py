@@ -16,7 +16,6 @@ from designer.base.design_folder import Folder
 from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import series_values
 from designer.base.manifest import file_hash
-from designer.base.progress import Progress
 from designer.catalog.parts_catalog import load_catalog
 from designer.centering.design_search import look
 from designer.centering.repair_slots import part_slots
@@ -319,7 +318,7 @@ def test_a_search_keeps_to_families_and_cases(
     wanted = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
     text = f'{more}{wanted}[search]\nopamps = ["OPA4192"]\n'
     with pytest.raises(InputError, match=word) as caught:
-        look(file_of(circuit, text), CATALOG, 1, Progress())
+        look(file_of(circuit, text), CATALOG, 1)
     assert caught.value.field == field
 
 
@@ -420,7 +419,6 @@ def test_a_study_renews_the_bill_of_a_folder_of_that_time(
                 read_model_file(out / "model.toml"),
                 out,
                 Options(samples=4, rung="exact", overwrite=True),
-                Progress(),
                 lambda _: "",
             )
         assert "bought better grades than its study drew" in caplog.text

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.base.progress import Progress
 from designer.board.bom import bill
 from designer.board.component import components, designator
 from designer.catalog.parts_catalog import load_catalog
@@ -186,7 +185,7 @@ def test_a_design_folder_with_composites_is_read_again(
     text = text.replace('resistors = "E96"', 'resistors = "E24"')
     modelfile = parse_model_file(text.replace("composites = false", 'composites = ["R50", "R210"]'))
     out = tmp_path / "out"
-    answer = synthesise_into(modelfile, out, Options(), Progress()).answer
+    answer = synthesise_into(modelfile, out, Options()).answer
     again = read_design(out)
     assert again.design.circuit.values == answer["parts"]
     assert again.design.composites

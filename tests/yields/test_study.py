@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from designer.base import progress
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import ManifestStage
-from designer.base.progress import Progress
 from designer.cli import entry
 from designer.folders import model_source, study_json
 from designer.folders.study_stores import NGSPICE, PIECES
@@ -98,7 +98,7 @@ class Fixed:
 
 def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
     monkeypatch.setattr(layers, "samples_task", Fixed(lost))
-    work = StudyWork(1, None, Stores(), LocalRunner(1), Progress(), "exact")
+    work = StudyWork(1, None, Stores(), LocalRunner(1), "exact")
     checked: Any = (None, None)
     return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
 
@@ -139,14 +139,13 @@ def test_a_study_that_ngspice_keeps_wide_ends_and_says_so(monkeypatch: pytest.Mo
     monkeypatch.setattr(layers, "samples_task", _first(Fixed(10)))
     monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     notes: list[str] = []
-    said = Progress()
-    monkeypatch.setattr(said, "note", notes.append)
+    monkeypatch.setattr(progress, "note", notes.append)
     p = plan(200)
     one = replace(p.questions[0], settings=SETTINGS)
     checked: Any = (None,)
     pool: Any = object()
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=0.04)
-    study = StudyWork(1, pool, Stores(), LocalRunner(1), said, "auto").grown(study)
+    study = StudyWork(1, pool, Stores(), LocalRunner(1), "auto").grown(study)
     assert study.narrow is False
     (both,) = study.combined
     assert both is not None
@@ -169,9 +168,8 @@ def test_a_response_without_an_answer_does_not_drive_the_study(
 
     monkeypatch.setattr(layers, "samples_task", Silent(10))
     notes: list[str] = []
-    said = Progress()
-    monkeypatch.setattr(said, "note", notes.append)
-    work = StudyWork(1, None, Stores(), LocalRunner(1), said, "exact")
+    monkeypatch.setattr(progress, "note", notes.append)
+    work = StudyWork(1, None, Stores(), LocalRunner(1), "exact")
     checked: Any = (None, None)
     study = work.grown(Study(checked, plan(200), (0, 1), {}, (), until=0.06))
     assert study.narrow is False
@@ -210,7 +208,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     spec = replace(p.questions[0].spec, expect=None)
     one = replace(p.questions[0], spec=spec, start=nominal, settings=SETTINGS)
     pool: Any = object()
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), "auto")
     checked: Any = (None,)
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
     monkeypatch.setattr(layers, "samples_task", _first(Near(10**9)))
@@ -247,7 +245,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), fidelity)
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), fidelity)
     study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
@@ -277,12 +275,11 @@ def test_boards_beyond_the_limit_of_steps_are_counted_and_said(
     step = 1.0 / (coarse.excitation.frequency * (1e6 - 1.0) / way)
     fine = replace(coarse, settings=replace(SETTINGS, max_step=step))
     notes: list[str] = []
-    said = Progress()
-    monkeypatch.setattr(said, "note", notes.append)
+    monkeypatch.setattr(progress, "note", notes.append)
     checked: Any = (None, None, None)
     study = Study(checked, replace(p, questions=(coarse, fine)), (0, 2), {1: "not shown"}, ())
     pool: Any = object()
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), said, "auto")
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), "auto")
     study = work.cross_checked(work.sampled(study))
     nominal = [c for c in study.cross_checks if c.question == 1 and c.kind is StartKind.NOMINAL]
     random = {c.sample for c in nominal if c.why is Why.RANDOM}
@@ -293,7 +290,7 @@ def test_boards_beyond_the_limit_of_steps_are_counted_and_said(
     assert [study.not_asked_of(i) for i in range(3)] == [0, 0, left]
     (note,) = notes
     assert note.startswith(f"response 3: {left} boards are not asked in ngspice")
-    alone = StudyWork(1, None, Stores(), LocalRunner(1), said, "exact").cross_checked(study)
+    alone = StudyWork(1, None, Stores(), LocalRunner(1), "exact").cross_checked(study)
     assert alone.cross_checks == ()
     assert notes == [note]
 
@@ -323,7 +320,7 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
         for q in (p.questions[0], p.questions[0])
     )
     pool: Any = object()
-    work = StudyWork(1, pool, Stores(), LocalRunner(1), Progress(), "auto")
+    work = StudyWork(1, pool, Stores(), LocalRunner(1), "auto")
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, (), until=0.05)
     study = work.grown(study)
@@ -342,17 +339,16 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
     p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
     monkeypatch.setattr(tolerance_study, "plan_study", lambda *_, **__: p)
     notes: list[str] = []
-    said = Progress()
-    monkeypatch.setattr(said, "note", notes.append)
+    monkeypatch.setattr(progress, "note", notes.append)
     made: Any = SimpleNamespace(
         modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
     )
-    tolerance(made, samples=3, fidelity="exact", checked=(), progress=said)
+    tolerance(made, samples=3, fidelity="exact", checked=())
     assert len(notes) == (spread is not None)
     assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
 
-class AgreementCheck(Progress):
+class AgreementCheck(progress.Progress):
     """Keeps what is said."""
 
     def __init__(self) -> None:
@@ -394,12 +390,13 @@ def test_only_runs_that_are_not_on_disk_are_announced(
         def rows(self, *_: Any) -> BlockStore[Any]:
             return store
 
-    progress, pool = AgreementCheck(), object()
-    work = StudyWork(1, pool, Kept(), LocalRunner(1), progress, "auto")  # type: ignore[arg-type]
+    heard, pool = AgreementCheck(), object()
+    work = StudyWork(1, pool, Kept(), LocalRunner(1), "auto")  # type: ignore[arg-type]
     checked: Any = (None, None)
     study = Study(checked, p, (0, 1), {}, tuple(answers))
-    assert len(work._checks(study, asks)) == len(asks) == 120
-    assert progress.stages == said
+    with progress.report_to(heard):
+        assert len(work._checks(study, asks)) == len(asks) == 120
+    assert heard.stages == said
 
 
 def test_a_map_that_is_there_is_not_made_again(
@@ -421,7 +418,7 @@ def test_a_map_that_is_there_is_not_made_again(
             return pieces
 
     monkeypatch.setattr(tolerance_study, "yield_map", yield_map)
-    work = StudyWork(1, None, Kept(), LocalRunner(1), Progress(), "exact")
+    work = StudyWork(1, None, Kept(), LocalRunner(1), "exact")
     checked: Any = (SimpleNamespace(model=SimpleNamespace(b=0.25)),) * 2
     study = Study(checked, p, (0, 1), {}, ())
     with pytest.raises(KeyboardInterrupt):
