@@ -107,8 +107,8 @@ class HeyokaBatch:
     def __call__(self, starts: Array, periods: int) -> Array:
         """(N, n) states after whole drive periods from ``starts`` (N, n) at drive phase 0."""
         out, ta, boards = np.empty_like(starts), self._integrator, self.boards
-        touching = boards.depth[:, :, :-2] @ starts[:, :, None]
-        touching = (touching[:, :, 0] + boards.depth[:, :, -1] > 0.0).T
+        depths = (boards.depth[:, :, :-2] @ starts[:, :, None])[:, :, 0] + boards.depth[:, :, -1]
+        touching = (depths > 0.0).T
         contacts, end = len(touching), np.full(self.size, periods * 2.0 * math.pi / boards.omega)
         for first in range(0, len(starts), self.size):
             lanes = np.minimum(np.arange(first, first + self.size), len(starts) - 1)

@@ -10,6 +10,7 @@ from benchmarks import bench_ensembles
 from benchmarks.bench_tolerance import plan_of
 from benchmarks.ensembles import runge_kutta
 from designer.circuit.ensemble import Ensemble
+from designer.verdicts.verdict import Question, StudyPlan
 
 
 @pytest.mark.slow
@@ -28,9 +29,7 @@ def test_a_quick_look(monkeypatch: pytest.MonkeyPatch) -> None:
     _half_a_step_is_a_fraction_of_the_error(plan, plan.questions[0])
 
 
-def _half_a_step_is_a_fraction_of_the_error(
-    plan: bench_ensembles.StudyPlan, question: bench_ensembles.Question
-) -> None:
+def _half_a_step_is_a_fraction_of_the_error(plan: StudyPlan, question: Question) -> None:
     boards, drive = Ensemble(plan.boards(range(2))), question.excitation.drive
     numbers = bench_ensembles.numbers_of(boards, drive, 2)
     starts = np.tile(question.start.start, (2, 1))
