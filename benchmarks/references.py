@@ -264,11 +264,13 @@ def _root(here: _Segment, sign: Any, level: Any, bracket: tuple[float, float]) -
 # Competitors
 
 
-def _compile(function: Function) -> Function:
-    return numba.njit(fastmath={"contract", "nsz", "arcp"}, error_model="numpy")(function)  # type: ignore[no-any-return]
+def compile_rival(function: Function, *, inline: bool = False) -> Function:
+    """Compile a competitor as our kernels are. inline : into all its callers."""
+    how = {"fastmath": {"contract", "nsz", "arcp"}, "error_model": "numpy", "forceinline": inline}
+    return numba.njit(**how)(function)  # type: ignore[no-any-return]
 
 
-@_compile
+@compile_rival
 def _rhs(t: float, x: Any, A: Any, B: Any, d: Any, omega: float) -> Any:
     out = np.empty(4)
     s = math.sin(omega * t)
@@ -324,7 +326,7 @@ def scipy_with_events(
         side = exits[next(i for i, hit in enumerate(run.t_events) if len(hit))][1]
 
 
-@_compile
+@compile_rival
 def _rk4(
     x: float, v: float, y: float, u: float, rates: Array, gap: float, omega: float, steps: int,
     periods: int,

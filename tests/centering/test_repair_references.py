@@ -4,7 +4,6 @@ of another seed."""
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import cast
 
 import numpy as np
@@ -26,17 +25,17 @@ from designer.spread.spread import draw_many
 from designer.verdicts.verdict import Question, StudyPlan
 from designer.yields.margins import Limit, Margin
 from designer.yields.yield_count import Yield
+from tests.shared.exploring import quick
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 BAND = 0.05
 OTHER_SEED = 4242
 
 
-@cache
-def design(p: int, omega: float, zone: str) -> Synthesis:
+def design(p: int, omega: float) -> Synthesis:
     """For one 1-p-p response of the paper's model, from coarse parts of 1 %."""
     wanted = f'[[response]]\nomega = {omega}\nexpect = "1-{p}-{p}"\n'
-    circuit = f'{COARSE_CIRCUIT}dead_zone = "{zone}"\n'
+    circuit = f'{COARSE_CIRCUIT}dead_zone = "rectifier"\n'
     tuning = f"[tuning]\noffset = {BAND}\n"
     return synthesise(parse_model_file("format = 1\n" + PAPER_TABLE + wanted + circuit + tuning))
 
@@ -45,12 +44,12 @@ def only(kind: str, base: Synthesis, target: float) -> Repair:
     return find_repair(base, target, trim=BAND, without=frozenset(KINDS) - {kind}, seed=3, jobs=1)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(("p", "omega"), quick([(2, 0.85), (8, 0.215)]))
 def test_the_references_are_taken_where_they_move_the_limit(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, p: int, omega: float
 ) -> None:
     """With a limit that is known, so that each option's yield is the share of drawn boards."""
-    base, target = design(8, 0.215, "rectifier"), 0.97
+    base, target = design(p, omega), 0.97
     circuit = base.design.circuit
     boards = draw_many(circuit, spread_of(base.modelfile, circuit, base.catalog), 3, range(4000))
     differing = quantities(circuit, boards)

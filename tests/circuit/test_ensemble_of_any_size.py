@@ -1,4 +1,4 @@
-"""Boards of three masses and two clearances: the compiled way is the general one."""
+"""Boards of any number of masses, with two clearances: the compiled way is the general one."""
 
 from __future__ import annotations
 
@@ -22,20 +22,26 @@ from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw_many
 from designer.yields.study_plan import plan_study
 from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.exploring import quick
 from tests.shared.system_text import clearance, system_text, table
 
-STIFFNESS = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
-SYSTEM = SecondOrderSystem(
-    mass=np.ones(3),
-    damping=0.2 * STIFFNESS,
-    stiffness=STIFFNESS,
-    force=np.array([1.5, 0.0, 0.0]),
-    clearances=(
-        Clearance.even(0, 9.0, 0.3),
-        Clearance("B", 2, None, Side(0.15, 5.0), Side(0.2, 7.0)),
-    ),
-)
-SCALE = Scale(1e-3, np.full(6, 6.0), 1.3)
+
+def chain_of(masses: int) -> SecondOrderSystem:
+    """Equal masses between two walls; a clearance at the first and one at the last."""
+    stiffness = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
+    return SecondOrderSystem(
+        mass=np.ones(masses),
+        damping=0.2 * stiffness,
+        stiffness=stiffness,
+        force=np.array([1.5, *(masses - 1) * [0.0]]),
+        clearances=(
+            Clearance.even(0, 9.0, 0.3),
+            Clearance("B", masses - 1, None, Side(0.15, 5.0), Side(0.2, 7.0)),
+        ),
+    )
+
+
+SECONDS, GENERATOR = 1e-3, 1.3
 COUNT = 6
 TOGETHER = system_text(
     {"m1": "2.14 kg", "m2": "1.32 kg"},
@@ -59,11 +65,13 @@ TOGETHER = system_text(
 and proves nothing of the diodes."""
 
 
-def test_every_clearance_is_counted_as_by_the_general_kernel() -> None:
-    circuit = exact_circuit(SYSTEM, SCALE)
-    drive = Drive(1.1 / SCALE.seconds, -SCALE.generator)
+# The code for two masses is compiled for many other tests.
+@pytest.mark.parametrize("masses", quick([2, 3]))
+def test_every_clearance_is_counted_as_by_the_general_kernel(masses: int) -> None:
+    circuit = exact_circuit(chain_of(masses), Scale(SECONDS, np.full(2 * masses, 6.0), GENERATOR))
+    drive = Drive(1.1 / SECONDS, -GENERATOR)
     nominal = Flow(Reduction(circuit, nominal_board(circuit)).system(), drive)
-    start = settle(nominal, np.zeros(6)).start
+    start = settle(nominal, np.zeros(2 * masses)).start
     boards = draw_many(circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 7, range(COUNT))
     starts = np.tile(start, (COUNT, 1))
     fast, slow = Ensemble(boards), Ensemble(boards, fast=False)
@@ -95,8 +103,8 @@ def test_boards_with_a_mass_that_nothing_moves_are_served() -> None:
         force=np.array([0.5, 0.0]),
         clearances=(Clearance.even(0, 9.0, 5.0),),
     )
-    circuit = exact_circuit(system, Scale(1e-3, np.full(4, 2.0), 1.3))
-    drive = Drive(0.8 / SCALE.seconds, -SCALE.generator)
+    circuit = exact_circuit(system, Scale(SECONDS, np.full(4, 2.0), GENERATOR))
+    drive = Drive(0.8 / SECONDS, -GENERATOR)
     boards = draw_many(circuit, Spread(0.01, 0.01, 0.0, 0.0), 7, range(2))
     boards = replace(boards, bias={name: np.zeros(2) for name in boards.bias})
     fast, slow = Ensemble(boards), Ensemble(boards, fast=False)

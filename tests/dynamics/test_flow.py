@@ -357,13 +357,14 @@ def test_modes_are_built_when_entered_and_once() -> None:
     assert system.built == 3
 
 
-def test_many_modes_grow_the_tables() -> None:
-    """Three two-sided clearances on one chain: more modes than the tables begin with."""
-    rng = np.random.default_rng(4)
-    system = random_chain(rng, 3, 3)
+# The code for two masses is compiled for many other tests.
+@pytest.mark.parametrize(("masses", "seed"), quick([(2, 6), (3, 4)]))
+def test_many_modes_grow_the_tables(masses: int, seed: int) -> None:
+    """Three clearances on one chain: more modes than the tables begin with."""
+    system = random_chain(np.random.default_rng(seed), masses, 3)
     flow = Flow(system, Drive(0.7, 3.0))
-    run = flow.run(np.zeros(6), 30)
-    again = Flow(system, Drive(0.7, 3.0)).run(np.zeros(6), 30)
+    run = flow.run(np.zeros(2 * masses), 30)
+    again = Flow(system, Drive(0.7, 3.0)).run(np.zeros(2 * masses), 30)
     assert system.built > 4
     assert np.array_equal(run.strobes, again.strobes)
 

@@ -1,7 +1,8 @@
-"""``--no-skips`` counts skips as failures, and nothing else."""
+"""``--no-skips`` counts skips as failures, and nothing else; long files come first."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,21 @@ def test_an_expected_failure_stays_one(session: pytest.Pytester) -> None:
     result = session.runpytest_subprocess("--no-skips")
     result.assert_outcomes(xfailed=1)
     assert result.ret == 0
+
+
+def test_files_that_take_long_come_first(session: pytest.Pytester) -> None:
+    slow = "import pytest\n@pytest.mark.slow\ndef test_a(): pass"
+    session.makepyfile(test_c=slow, test_b="def test_a(): pass", test_a="def test_a(): pass")
+    session.mkdir("cli").joinpath("test_entry.py").write_text(slow, encoding="utf-8")
+    lines = session.runpytest_subprocess("--collect-only", "-q").outlines
+    assert [line for line in lines if "::" in line] == [
+        f"{name}.py::test_a" for name in ("cli/test_entry", "test_c", "test_a", "test_b")
+    ]
+
+
+def test_files_of_known_seconds_are_there() -> None:
+    text = CONFTEST.read_text(encoding="utf-8")
+    names = re.findall(r'^    "(\w+/test_\w+\.py)": \d+,$', text, re.MULTILINE)
+    assert len(names) > 20
+    for name in names:
+        assert (CONFTEST.parent / name).exists(), name
