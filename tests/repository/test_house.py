@@ -75,7 +75,7 @@ REACH = {
     "catalog": 6_150,
     "new": 11_700,
     "simulate": 28_300,
-    "bifurcation": 35_000,
+    "bifurcation": 35_050,
     "reproduce": 57_450,
     "rules": 54_100,
     "explore": 52_150,
