@@ -91,11 +91,12 @@ def _mode(flow: Flow, x: Array, angle: float, contact: GrazingContact) -> Mode:
     system = flow.system
     mode = system.mode(flow.mode_at(x, angle))
     if contact.clearance >= len(system.clearances):
-        # At a corner the guard of the piece within is that of the corner, of the piece beyond its
-        # negative.
-        row = system.contact_rows(contact.clearance)[1]
-        leads_away = -row if contact.tip else row
-        across = (g for g in mode.guards if np.array_equal(g.row, leads_away))
+        # The guard of the piece within leads away from rest, that of the piece beyond back.
+        corner = system.corners[contact.clearance - len(system.clearances)]
+        across = (
+            g for g in mode.guards
+            if g.corner == corner.corner and (g.C @ corner.C < 0.0) == contact.tip
+        )  # fmt: skip
         return next((system.mode(guard.target) for guard in across), mode)
     wanted = 0 if contact.tip else contact.side
     if mode.sides[contact.clearance] == wanted:

@@ -260,7 +260,8 @@ def _stops(curve: Curve, a: BranchPoint, b: BranchPoint, kind: PointKind) -> str
     """``Bifurcation.stops`` of what happens between two points."""
     system = curve.family.flow(a.value).system
     if kind is PointKind.CORNER:
-        return " and ".join(str(system.corners[k].corner) for k in _corners(a, b))
+        touched = (str(system.corners[k].corner) for k in _corners(a, b))
+        return " and ".join(dict.fromkeys(touched))  # on a board two stages may share one
     names = system.clearances
     changed = _changed(a, b)
     words = []

@@ -22,7 +22,7 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.drive_shape import SINE
 from designer.dynamics.flow import Flow
-from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import ForceCorner, Mode, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.steady_state import UPPER, DrivenSystem
 from designer.model.find_responses import scale_of
 from designer.model.mechanics import (
@@ -42,6 +42,8 @@ SETTINGS = {
 """The generator's settings with their ranges: Hz, V peak, V."""
 UNITS = {"frequency": "Hz", "amplitude": "V", "offset": "V", "x": "V", "v": "V", "λ": "1/s"}
 """The units of a board's parameters, and of the two axes and the exponent of a diagram."""
+ROUNDING = 1e-9
+"""Relative: what a corner's place may be off that a dead zone of another mass's units has."""
 
 
 class BoardSubject:
@@ -68,7 +70,7 @@ class BoardSubject:
         self.frequency = frequency
         self.amplitude = design.amplitude() if amplitude is None else amplitude
         self.offset = offset
-        self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
+        self.system = _with_corners(nominal_reduction(design).system(), design)
         self.states = design.circuit.state_nets
         self.weights = np.ones(len(self.states))
         self.units: Mapping[str, str] = UNITS
@@ -234,3 +236,43 @@ class BoardSubject:
             amplitude=amplitude,
             offset=float(change.get("offset", self.offset)),
         )
+
+
+def _with_corners(system: PiecewiseLinearSystem, design: Design) -> PiecewiseLinearSystem:
+    """The nominal board, its guards at corners of the model's laws marked as those of the model."""
+    corners = _corners(design)
+
+    def build(key: ModeKey) -> Mode:
+        mode = system.mode(key)
+        changed = (
+            next(
+                i for i, both in enumerate(zip(key, guard.target, strict=True)) if len({*both}) > 1
+            )
+            for guard in mode.guards
+        )
+        pairs = zip(mode.guards, changed, strict=True)
+        return replace(mode, guards=tuple(replace(g, corner=corners.get(i)) for g, i in pairs))
+
+    return replace(system, build=build, _modes={}) if corners else system
+
+
+def _corners(design: Design) -> dict[int, ForceCorner]:
+    """By the number of the switch with which a dead zone begins; places as the model has them."""
+    model, circuit, found = design.model.second_order(), design.circuit, dict[int, ForceCorner]()
+    laws = {law.name: (np.array(law.row), law.corners) for law in model.laws if not law.curved}
+    risen = {
+        clearance.name: (
+            model.displacement(clearance),
+            tuple(side * (s.gap + s.rise) for side, s in clearance.sides if s.rise),
+        )
+        for clearance in model.clearances
+    }
+    for zone, stop in zip(model.dead_zones, circuit.dead_zones, strict=True):
+        row, places = (laws | risen).get(zone.bend_of, (np.zeros(0), ()))
+        ends = dict(zone.sides)
+        for side, contact in stop.contacts if places else ():
+            switch = circuit.switches.index(contact.switch)
+            place = side * ends[side].gap * float(row[zone.mass])
+            if np.isclose(place, places, rtol=ROUNDING, atol=0.0).any():
+                found[switch] = ForceCorner(switch, place, zone.bend_of)
+    return found

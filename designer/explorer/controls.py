@@ -3,7 +3,7 @@ stand in lists."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from designer.base.errors import InputError
@@ -65,10 +65,11 @@ class Control:
         return float(f"{value * self.scale:.{digits}g}") / self.scale
 
 
-def controls(modelfile: ModelFile) -> tuple[Control, ...]:
-    """One for ω, then one for every parameter but points and entries, those of the drive first."""
+def controls(modelfile: ModelFile, asked: Collection[str] = ()) -> tuple[Control, ...]:
+    """One for ω, then one for every parameter, those of the drive first; of points of laws and
+    entries of matrices those that are ``asked`` for."""
     place, subject = first_place(modelfile), ModelSubject(modelfile.model, scales=modelfile.si)
-    each = [_of_omega(modelfile, place, subject), *_parameters(place.model, subject.units)]
+    each = [_of_omega(modelfile, place, subject), *_parameters(place.model, subject.units, asked)]
     return tuple(sorted(each, key=lambda control: not control.drive))
 
 
@@ -116,9 +117,11 @@ def _of_omega(modelfile: ModelFile, place: ModelPlace, subject: ModelSubject) ->
     return Control(OMEGA, "drive frequency", si.name, low, high, place.omega, True, True, si.scale)
 
 
-def _parameters(model: MechanicalModel, units: Mapping[str, str]) -> Iterator[Control]:
+def _parameters(
+    model: MechanicalModel, units: Mapping[str, str], asked: Collection[str]
+) -> Iterator[Control]:
     for name, (least, most) in model.parameters.items():
-        if name in model.listed:
+        if name in model.listed and name not in asked:
             continue
         value = model.parameter(name)
         low, high, logarithmic = _range(value, least, most)

@@ -6,7 +6,7 @@ The plots are Bokeh figures, empty; the page fills their columns and colours the
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from typing import Any
 
@@ -197,15 +197,17 @@ def _templates() -> Environment:
     return page_templates("designer.explorer")
 
 
-def page(modelfile: ModelFile, losses: FolderLosses | None = None) -> str:
+def page(
+    modelfile: ModelFile, losses: FolderLosses | None = None, asked: Collection[str] = ()
+) -> str:
     """The page that ``server`` gives out; it loads ``ASSETS`` from beside itself. losses : of the
-    model's folder."""
+    model's folder. asked : words of its address."""
     css, *scripts = ("explore.css", "bokeh.js", "explore.js")
     return _render(
         modelfile,
         styles=Markup(f'<link rel="stylesheet" href="{css}">'),
         scripts=Markup("".join(f'<script src="{name}"></script>' for name in scripts)),
-        shown=controls(modelfile),
+        shown=controls(modelfile, asked),
         losses=losses,
     )
 
@@ -241,7 +243,7 @@ def _render(
     losses: FolderLosses | None = None,
     allowed: Sequence[str] = (),
 ) -> str:
-    each = controls(modelfile)
+    each = controls(modelfile, [control.name for control in shown])
     (omega,) = (control for control in each if control.name == OMEGA)
     motions = shown_motions(first_place(modelfile).model.second_order())
     if recording is not None:

@@ -242,7 +242,8 @@ def _side(
     modelfile: ModelFile, place: ModelPlace, key: str, words: Mapping[str, object]
 ) -> MapSide:
     """What the words say of one parameter. key : "x" or "y"."""
-    every, name = {each.name: each for each in controls(modelfile)}, str(words.get(key))
+    name = str(words.get(key))
+    every = {each.name: each for each in controls(modelfile, [name])}
     field = f"map.{key}"
     if name not in every:
         raise InputError(None, field, name, one_of(name, every))

@@ -266,7 +266,8 @@ class _Page(_Guarded):
             self.set_cookie(
                 self._cookie, self.explorer.token, httponly=True, samesite="Strict", path="/"
             )
-        self.write(page(self.explorer.modelfile, self.explorer.losses))
+        asked = [*self.request.query_arguments, *self.get_query_argument("map", "").split("~")]
+        self.write(page(self.explorer.modelfile, self.explorer.losses, asked))
 
 
 class _Asset(_Guarded):

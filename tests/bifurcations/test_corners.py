@@ -16,10 +16,12 @@ from designer.bifurcations.conditions import grazings
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import all_windows
+from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.attractors import settle
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.point_captions import caption
+from tests.shared.rule_cases import bent
 from tests.shared.system_text import clearance, system_text, table
 
 JOINT = ("a", "ground")
@@ -94,6 +96,30 @@ def test_a_corner_of_a_law_of_velocity() -> None:
     (point,) = corners(found.points)
     assert point.value == pytest.approx(0.3 + 0.2 * 0.5, abs=1e-8)
     assert point.stops == "drag at 0.5 and drag at -0.5"
+
+
+def test_a_corner_of_a_law_on_a_board() -> None:
+    """Where a spring of 7, which holds up to 0.5, lets the mass move by that, to within what the
+    parts are off; the diodes of the stage, between which it bends, add no point of their own. Its
+    curve over the generator's settings too."""
+    design = bent(0.01).synthesis.design
+    frequency = design.errors.scales.frequency
+    board = BoardSubject(design, frequency(1.2))
+    family, volts = board.family("amplitude"), board.amplitude
+    orbit = settle(family.flow(2.5 * volts), np.zeros(2))
+    found = survey(family, [(2.5 * volts, orbit)], 2.5 * volts, 2.8 * volts, depth=0).points
+    (point,) = corners(found)
+    assert point.stops == "K at 0.5"
+    window = PlaneWindow((2.5 * volts, 3.1 * volts), (frequency(1.0), frequency(1.4)))
+    plane = board.plane("amplitude", "frequency")
+    curve = continued(plane, point, frequency(1.2), window)
+    assert curve is not None
+    assert set(curve.ends) == {"edge of frequency"}
+    assert len(curve.points) > 10
+    for given, hertz in [(point.value, frequency(1.2)), *curve.values]:
+        omega = 2.0 * math.pi * hertz * design.errors.scales.seconds
+        wanted = 0.5 * amplitude_at_corner(omega, 7.0)
+        assert given / volts == pytest.approx(wanted, rel=2.0 * design.errors.max_error)
 
 
 HANGING = table("law", name="F", between=list(JOINT), points=[[-1, 0], [0.7, 0], [2, 1]])

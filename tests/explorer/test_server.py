@@ -30,9 +30,11 @@ WIRES: list[WebSocketClientConnection] = []
 Visit = Callable[[int], Awaitable[Any]]
 
 
-def visiting(visit: Visit, tmp_path: Path, token: str = "", host: str = "127.0.0.1") -> Any:
+def visiting(
+    visit: Visit, tmp_path: Path, token: str = "", host: str = "127.0.0.1", model: str = "paper"
+) -> Any:
     """What a visitor of a server finds; the server stands in this process."""
-    modelfile = read_model_file(EXAMPLES / "paper.toml")
+    modelfile = read_model_file(EXAMPLES / f"{model}.toml")
 
     async def both() -> Any:
         queue = WorkQueue()
@@ -89,6 +91,19 @@ def test_the_page_and_its_files_load_nothing_from_elsewhere(tmp_path: Path) -> N
         assert "http://" not in text.replace("http://www.w3.org", "")
         assert "https://" not in text
         assert "default-src 'none'" in response.headers["Content-Security-Policy"]
+
+
+@pytest.mark.parametrize("query", ["?K.f4=1.7", "?map=K.f4~omega~~~~"])
+def test_a_point_of_a_law_in_the_address_has_a_slider(tmp_path: Path, query: str) -> None:
+    """Its page reads what its sliders are named after, and nothing else."""
+
+    async def visit(port: int) -> list[str]:
+        return [(await get(port, f"/{each}")).body.decode("utf-8") for each in ("", query)]
+
+    plain, asked = visiting(visit, tmp_path, model="two-wells-chaos")
+    assert 'data-name="K.f4"' not in plain
+    assert 'data-name="K.f4"' in asked
+    assert asked.count("data-name=") == plain.count("data-name=") + 1
 
 
 def test_a_question_is_answered_and_a_bad_one_too(tmp_path: Path) -> None:
