@@ -84,7 +84,7 @@ class WindowEnds:
     ends: tuple[tuple[SweptEnd, SweptEnd] | None, ...]
     """The lower and the upper end of each window of the sweep; None of one that is not periodic."""
     families: tuple[int | None, ...]
-    """The family of each window, as of ``window_families.families``."""
+    """The family of each window, as of ``families``."""
 
     @property
     def missing(self) -> list[SweptEnd]:

@@ -249,12 +249,12 @@ def _render(
     if recording is not None:
         motions = motions[: len(recording["views"][0]["motions"])]
     unit, scale = length_unit(modelfile)
-    items = items(omega, unit, motions[0].motion.symbol)
+    plots = items(omega, unit, motions[0].motion.symbol)
     if recording is None:
-        items |= map_item()
+        plots |= map_item()
     data = _script_text(
         {
-            "plots": items,
+            "plots": plots,
             "recording": recording,
             "losses": None if losses is None else losses.message(),
             "settled_within": PERIODS,
