@@ -24,7 +24,7 @@ env: $(VENV)/.installed ## create $(VENV) with the locked requirements and this 
 # Two stamps, so that an edit of pyproject.toml does not download everything anew. Python compiles
 # a module when it is first imported; pip would compile all of them, which takes a minute.
 $(VENV)/.locked: $(LOCK)
-	@echo "Creating $(VENV) from $(LOCK) (1.7 GB; one to five minutes)"
+	@echo "Creating $(VENV) from $(LOCK) (1.4 GB; up to four minutes)"
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "designer needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
 	@$(PYTHON) -m venv --clear $(VENV)
 	@$(PIP) install --no-compile --require-hashes --requirement $(LOCK)

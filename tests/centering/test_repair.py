@@ -731,7 +731,7 @@ def test_a_design_is_repaired_and_its_repair_is_a_design(tmp_path: Path) -> None
     assert {**one, "cost": 0} == {**two, "cost": 0}
     assert repair_into(design, target=0.99, without=WITHOUT).reused
 
-    options = Options(seed=99, samples=400, rung="exact")
+    options = Options(seed=99, samples=400, rung="exact", blame=False)
     modelfile = parse_model_file((out / "model.toml").read_text(encoding="utf-8"), out / "m.toml")
     modelfile = replace(modelfile, source=out / "model.toml")
     yields = run_into(modelfile, out, options, lambda _: "").answer["responses"]
