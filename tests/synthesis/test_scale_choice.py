@@ -388,8 +388,8 @@ SLOW_BASE = system_text(
 offsets are 0.12 of the drive."""
 
 
-@pytest.mark.slow
-def test_scales_keep_offsets_small_beside_the_drive() -> None:
+@cache
+def slow_base() -> tuple[Order, ConditionLimits]:
     file = parse_model_file(SLOW_BASE)
     found = find(file.model, file.responses)
     spec = replace(file.circuit, dead_zone="rectifier")
@@ -398,14 +398,33 @@ def test_scales_keep_offsets_small_beside_the_drive() -> None:
     order = Order.of(file.model, spec, CATALOG, held, largest=largest, drive_force=drive)
     unit = file.model.second_order().own_frequency
     conditions = spec.active_conditions
-    within = limits(spec, conditions, order.opamp, order.output.limit, held.fastest, unit=unit)
+    return order, limits(spec, conditions, order.opamp, order.output.limit, held.fastest, unit=unit)
+
+
+def test_a_cut_touches_the_offsets_where_it_is_made() -> None:
+    """A thousandth beside it they differ by the square of that: its slope is theirs."""
+    choice = ScaleChoice(*slow_base())
+    z = choice.box.points(1, 1.0, seed=0)[0]
+    line = choice._offset_cut(z).log
+    around = z + 1e-3 * np.vstack([np.zeros(len(z)), np.eye(len(z)), -np.eye(len(z))])
+    lines = [line.constant + line.weights @ each for each in around]
+    offsets = choice._over(around)
+    assert lines[0] == pytest.approx(offsets[0], abs=1e-9)
+    assert lines == pytest.approx(offsets, abs=2e-5)
+    assert np.ptp(offsets) > 2e-4, "they do depend on the scales"
+
+
+@pytest.mark.slow
+def test_scales_keep_offsets_small_beside_the_drive() -> None:
+    order, within = slow_base()
+    model = parse_model_file(SLOW_BASE).model
 
     def offsets(choice: ScaleChoice) -> float:
         first = next(choice.circuits())
         assert isinstance(first, ScaleAttempt)
         made = first.made
-        system, volts = file.model.second_order(), made.errors.scales.volts
-        (at,) = forces(made.circuit, system, volts, drive)
+        volts = made.errors.scales.volts
+        (at,) = forces(made.circuit, model.second_order(), volts, order.drive_force)
         return float(np.linalg.norm([10e-3 * share for share in at.offset.values()]))
 
     assert offsets(ScaleChoice(order, within)) <= 0.05
