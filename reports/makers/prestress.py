@@ -105,9 +105,9 @@ def evidence(file: ModelFile) -> list[Evidence]:
     text = (
         f"At ω = {OMEGA:g} the orbit with one contact a period of a stop that pushes at once has a "
         "closed form, but for three roots. The circuit's stop pushes over a depth; as the depth "
-        "falls, its orbit goes to that of the jump. Below, the mass moves without contact up to the "
-        "frequency at which it fills the gap. At a jump its response ends there, since past it no "
-        "orbit of its period is found."
+        "falls, its orbit goes to that of the jump. Below, the mass moves without contact up to "
+        "the frequency at which it fills the gap. At a jump its response ends there, since past it "
+        "no orbit of its period is found."
     )
     name = "prestress"
     caption = (

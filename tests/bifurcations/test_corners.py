@@ -1,5 +1,5 @@
-"""Corners of laws, and stops whose force jumps, that an orbit comes to touch, against the closed form of the linear motion that
-never passes them."""
+"""Corners of laws, and stops whose force jumps, that an orbit comes to touch, against the closed
+form of the linear motion that never passes them."""
 
 from __future__ import annotations
 
