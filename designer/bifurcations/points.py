@@ -174,9 +174,9 @@ def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
             if located is not None:
                 points.append(located)
     points.sort(key=lambda p: p.position)
-    located = [_with_sides(branch, point, points) for point in points]
-    ends = [_touched_at_end(branch, side, number) for side in (0, 1)]
-    return [*filter(None, ends[:1]), *located, *filter(None, ends[1:])]
+    within = [_with_sides(branch, point, points) for point in points]
+    first, last = (_touched_at_end(branch, side, number) for side in (0, 1))
+    return [point for point in (first, *within, last) if point is not None]
 
 
 def _touched_at_end(branch: Branch, side: int, number: int) -> Bifurcation | None:

@@ -126,8 +126,8 @@ def at_once(model: LumpedSystem, omega: float) -> Contact:
     ------
     ArithmeticError : none is found.
     """
-    names = (f"{PART}.mass", f"{PART}-ground.damping", f"{PART}-ground.stiffness")
-    names += (f"{PART}.amplitude", f"{STOP}.upper", f"{STOP}.stiffness", f"{STOP}.preload")
+    names = [f"{PART}.mass", f"{PART}-ground.damping", f"{PART}-ground.stiffness"]
+    names += [f"{PART}.amplitude", f"{STOP}.upper", f"{STOP}.stiffness", f"{STOP}.preload"]
     numbers = tuple(model.parameter(name) for name in names)
     gap, period = numbers[4], 2.0 * math.pi / omega
 
