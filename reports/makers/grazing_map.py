@@ -248,7 +248,6 @@ EXAMPLE = Example(
     "inverse square root, which has no bound: this is what makes a pre-stressed stop lose its "
     "orbit at the first touch.",
     board="The pre-stressed stop and the damper are for comparison in the model alone; a circuit "
-    "has such a stop with a push that rises over a depth "
-    "([prestressed](../prestressed/README.md)). The board is of the file as it stands: a relaxed "
-    "stop above, and below one that the mass rests against.",
+    "has such a stop with a push that rises over a depth (prestressed.toml). The board is of the "
+    "file as it stands: a relaxed stop above, and below one that the mass rests against.",
 )

@@ -192,8 +192,8 @@ def _figure(model: LumpedSystem, orbit: Contact) -> Figure:
 EXAMPLE = Example(
     evidence,
     see="A stop that pushes at once changes the trace of the map's Jacobian by an inverse square "
-    "root at the first touch, so the response without contact ends there "
-    "([derivation](../preloaded/README.md)).",
+    "root at the first touch, as the report on preloaded.toml derives. So the response without "
+    "contact ends there.",
     board="Two dead zones make the stop: one from the gap on, as steep as the rise, and one that "
     "takes the rise away again past its depth. The steeper, the nearer to the jump, and the more "
     "the second one's threshold counts.",
