@@ -32,7 +32,7 @@ from designer.bifurcations.continuation import Branch, BranchPoint, End, at, joi
 from designer.bifurcations.orbit_curve import CONVERGED, Curve
 from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE
-from designer.dynamics.turning_points import heights
+from designer.dynamics.turning_points import heights, turning_points_of
 
 if TYPE_CHECKING:
     from designer.answers.bifurcation_answer import BirthRow, PointRow
@@ -42,6 +42,8 @@ ROUNDING = 1e-11
 ``orbit_curve.CONVERGED`` of its peak, as many times more."""
 ZERO = 1e-3
 """A test function that is more than this at its root, over its values on either side, jumped."""
+TOUCHED = 1e-6
+"""Of the orbit's peak: how far from a stop it turns, at most, whose branch was lost by grazing."""
 
 
 class PointKind(StrEnum):
@@ -100,9 +102,9 @@ class Bifurcation:
     point: BranchPoint
     """The orbit there."""
     before: str
-    """The branch's response right before it, in the branch's own order."""
+    """The branch's response right before it, in the branch's own order; "" where it begins."""
     after: str
-    """The branch's response right after it, in the branch's own order."""
+    """The branch's response right after it, in the branch's own order; "" where it ends."""
     stable: tuple[bool, bool]
     """Whether the branch is stable right before and right after it."""
     direction: int
@@ -125,7 +127,7 @@ class Bifurcation:
     def response(self) -> str:
         """ "n-p-q" of the orbit at the point; of a grazing one, on the branch's first side."""
         same = self.before == self.after or self.kind is PointKind.GRAZING
-        return self.before if same else self.point.response
+        return self.before or self.after if same else self.point.response
 
     @property
     def stable_sides(self) -> dict[int, bool] | None:
@@ -171,7 +173,49 @@ def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
             if located is not None:
                 points.append(located)
     points.sort(key=lambda p: p.position)
-    return [_with_sides(branch, point, points) for point in points]
+    within = [_with_sides(branch, point, points) for point in points]
+    first, last = (_touched_at_end(branch, side, number) for side in (0, 1))
+    return [point for point in (first, *within, last) if point is not None]
+
+
+def _touched_at_end(branch: Branch, side: int, number: int) -> Bifurcation | None:
+    """The grazing at which a branch was lost, where it was: if the force of a stop jumps, the map
+    has a square root there, and orbits of the period need not go on.
+
+    side : 0 for its beginning, 1 for its end.
+    """
+    if branch.ends[side] is not End.LOST or len(branch.points) < 2:
+        return None
+    point, inner = branch.points[-side], branch.points[1 - 3 * side]
+    flow = branch.curve.family.flow(point.value)
+    turning = [] if flow.system.continuous else turning_points_of(flow, point.orbit)
+    nearest = min(turning, key=lambda t: abs(t.height), default=None)
+    peak = float(np.abs(branch.curve.scale[:-1]).max())
+    if nearest is None or abs(nearest.height) > TOUCHED * peak:
+        return None
+    way, gap = point.value - inner.value, _gap(branch.curve, {nearest.clearance})
+    # From the contact's side the way to the stop is that of the square root of the depth.
+    power = 0.5 if nearest.height > 0.0 else 1.0
+    left, before = (abs(gap(each)) ** power for each in (point, inner))
+    error = abs(way * left / (before - left)) if before != left else abs(way)
+    shares = (point.stable, False) if side else (False, point.stable)
+    stop = f"the {'upper' if nearest.side > 0 else 'lower'} stop of "
+    stop += flow.system.clearances[nearest.clearance]
+    return Bifurcation(
+        parameter=branch.parameter,
+        value=point.value,
+        kind=PointKind.GRAZING,
+        error=max(error, ROUNDING * float(branch.curve.scale[-1])),
+        point=point,
+        before=point.response if side else "",
+        after="" if side else point.response,
+        stable=shares,
+        direction=int(np.sign(way)) * (1 if side else -1),
+        position=float(len(branch.points) - 1) if side else -1.0,
+        branch=number,
+        symmetric=_symmetric(branch.curve, point),
+        stops=stop if len(flow.system.clearances) > 1 else "",
+    )
 
 
 def _with_sides(branch: Branch, point: Bifurcation, every: list[Bifurcation]) -> Bifurcation:

@@ -57,6 +57,10 @@ def _change(point: Bifurcation) -> str:
         above, below = point.after, point.before
         if point.direction < 0:
             above, below = below, above
+        if not (above and below):
+            known = f"{label(below, point.symmetric)} below" if below else ""
+            known = known or f"{label(above, point.symmetric)} above"
+            return f"{known}; beyond no orbit of its period was found; {_stability(point)}"
         counts = (
             f"{label(below, point.symmetric)} below, {label(above, point.symmetric)} above; "
             "the counts of impacts change"

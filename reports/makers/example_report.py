@@ -36,6 +36,7 @@ from reports.makers import (
     grazing_map,
     instant_impact,
     persistence,
+    prestress,
     rattle,
     standing_post,
     weight,
@@ -62,6 +63,7 @@ EXAMPLES: Mapping[str, Example] = {
     "double-well": double_well.EXAMPLE,
     "restitution": instant_impact.EXAMPLE,
     "fixed-stop": standing_post.EXAMPLE,
+    "prestressed": prestress.EXAMPLE,
 }
 """What is shown of each model file, by its name."""
 OTHER = Example(lambda _: [], "", "")

@@ -247,9 +247,7 @@ EXAMPLE = Example(
     "grazing the first changes the trace of the Jacobian by a square root, the second by an "
     "inverse square root, which has no bound: this is what makes a pre-stressed stop lose its "
     "orbit at the first touch.",
-    board="The pre-stressed stop is for comparison in the model alone. Its force jumps at contact, "
-    "and a dead-zone stage is continuous, so a circuit refuses the key preload. A damper in "
-    "the contact is refused for the same reason. The board is of the file as it stands: a "
-    "relaxed stop above, and below one that the mass rests against, whose negative gap is the "
-    "nearest thing to a pre-stressed stop that can be built.",
+    board="The pre-stressed stop and the damper are for comparison in the model alone; a circuit "
+    "has such a stop with a push that rises over a depth (prestressed.toml). The board is of the "
+    "file as it stands: a relaxed stop above, and below one that the mass rests against.",
 )

@@ -200,6 +200,6 @@ EXAMPLE = Example(
     see="A stop that takes energy from each contact: the damper beside its spring is the one that "
     "leaves the stated share of the speed. With the drive above the plunger's own frequency it "
     "bounces once a period, below it twice.",
-    board="The force of the stop's damper is there at once, so a stage of its own carries it: the "
-    "board has the same contacts as the model.",
+    board="A capacitor beside the resistor of the stop's stiffness makes its damper: the output of "
+    "the dead zone changes with the velocity in contact, and not outside it.",
 )

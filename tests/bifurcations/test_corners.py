@@ -1,5 +1,5 @@
-"""Corners of laws that an orbit comes to touch, against the closed form of the linear motion that
-never passes them."""
+"""Corners of laws, and stops whose force jumps, that an orbit comes to touch, against the closed
+form of the linear motion that never passes them."""
 
 from __future__ import annotations
 
@@ -120,6 +120,30 @@ def test_a_corner_of_a_law_on_a_board() -> None:
         omega = 2.0 * math.pi * hertz * design.errors.scales.seconds
         wanted = 0.5 * amplitude_at_corner(omega, 7.0)
         assert given / volts == pytest.approx(wanted, rel=2.0 * design.errors.max_error)
+
+
+def test_a_branch_that_ends_where_a_stop_pushes_at_once() -> None:
+    """It touches the stop where the linear motion does, and no orbit of its period goes on."""
+    gap = clearance("S", *JOINT, upper=1.26, stiffness=29.0, preload=1.0)
+    force = table("force", on="a", amplitude=0.5)
+    text = system_text({"a": 1.0}, {JOINT: 1.0}, {JOINT: 0.1}, gap, force)
+    over = ModelSubject(parse_model_file(text).model, 0.77)
+    family = over.family("omega")
+    orbit = settle(family.flow(0.77), np.zeros(2))
+    found = survey(family, [(0.77, orbit)], 0.76, 0.8, depth=0)
+    (point,) = found.points
+
+    def off(omega: float) -> float:
+        return 1.26 * amplitude_at_corner(omega, damper=0.1) - 0.5
+
+    wanted = float(brentq(off, 0.77, 0.8, xtol=1e-14))
+    assert point.error < 1e-8
+    assert point.value == pytest.approx(wanted, abs=2.0 * point.error)
+    assert (point.kind, point.before, point.after) == (PointKind.GRAZING, "1-0-0", "")
+    (window,) = all_windows(found)
+    assert (window.low.value, window.high.point) == (0.76, point)
+    said = "1-0-0 symmetric below; beyond no orbit of its period was found; stable below, unstable"
+    assert said in caption(point, "ω")
 
 
 HANGING = table("law", name="F", between=list(JOINT), points=[[-1, 0], [0.7, 0], [2, 1]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 import re
@@ -22,6 +23,7 @@ from reports.makers import (
     grazing_map,
     instant_impact,
     persistence,
+    prestress,
     rattle,
     standing_post,
 )
@@ -204,6 +206,33 @@ def test_a_post_that_stays_is_touched_by_the_motion_of_the_mass(omega: float) ->
     ratio = abs((6e3 + 12j * omega) / (6e3 + 12j * omega - 1.2 * omega**2))
     wanted = 2e-3 / ratio
     assert standing_post.touching_amplitude(system("fixed-stop"), omega) == pytest.approx(wanted)
+
+
+def test_the_orbit_of_a_stop_that_pushes_at_once() -> None:
+    """By another integrator it comes back to where its contact began, and leaves the stop when it
+    says."""
+    orbit = prestress.at_once(system("prestressed"), 1.0)
+
+    def rates(t: float, x: Array) -> Array:
+        pushed = 1.0 + 29.0 * (x[0] - 1.26) if t < orbit.time else 0.0
+        return np.array([x[1], 0.5 * math.sin(orbit.angle + t) - 0.1 * x[1] - x[0] - pushed])
+
+    ends, x = (0.0, orbit.time, 2.0 * math.pi), np.array([1.26, orbit.speed])
+    for begin, end in itertools.pairwise(ends):
+        within = (begin, np.nextafter(end, begin))
+        x = solve_ivp(rates, within, x, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        assert x[0] == pytest.approx(1.26, abs=1e-9)
+        assert (x[1] < 0.0) is (end == orbit.time)
+    assert x[1] == pytest.approx(orbit.speed, abs=1e-9)
+
+
+def test_what_a_rise_is_off_falls_with_its_depth() -> None:
+    (evidence,) = prestress.evidence(read_model_file(EXAMPLES / "prestressed.toml"))
+    at_once, *rises, end = evidence.comparisons
+    assert max(abs(at_once.difference), abs(end.difference)) < 1e-8
+    off = [each.difference for each in rises]
+    for coarse, fine in itertools.pairwise(off):
+        assert fine == pytest.approx(0.1 * coarse, rel=0.01)
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.8, 1.5])

@@ -33,7 +33,7 @@ weight on a moving base."""
 
 
 def test_every_example_is_here() -> None:
-    assert len(FILES) == 11
+    assert len(FILES) == 12
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

@@ -77,7 +77,15 @@ def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str,
 def _gap(table: Mapping[str, Any], masses: list[float], mass: int, other: int) -> Gap:
     def springs(side: str) -> tuple[tuple[float, float], ...]:
         stiffness = table.get(f"{side}_stiffness", table.get("stiffness"))
-        return ((value_of(table[side]), value_of(stiffness)),) if side in table else ()
+        if side not in table:
+            return ()
+        gap, own = value_of(table[side]), value_of(stiffness)
+        if not rise:
+            return ((gap, own),)
+        # A preload that rises is a spring that takes itself back where it has risen.
+        return (gap, own + preload / rise), (gap + rise, -preload / rise)
+
+    preload, rise = (value_of(table.get(key, 0.0)) for key in ("preload", "preload_over"))
 
     damping = value_of(table.get("damping", 0.0))
     if "restitution" in table:
@@ -92,7 +100,7 @@ def _gap(table: Mapping[str, Any], masses: list[float], mass: int, other: int) -
         springs("upper"),
         springs("lower"),
         damping,
-        value_of(table.get("preload", 0.0)),
+        0.0 if rise else preload,
     )
 
 
