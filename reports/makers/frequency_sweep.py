@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from designer.base.page import Table, table
+from designer.base.units import axis_label
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
 from designer.dynamics.steady_state import TransientSettings
@@ -24,7 +25,7 @@ def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
     """The part of a report about what is reached at each frequency."""
     low, high = _range(file)
     plan = SweepPlan(
-        ModelSubject(file.model),
+        ModelSubject(file.model, scales=file.si),
         "omega",
         np.linspace(low, high, STEPS),
         course=COURSE,
@@ -32,12 +33,14 @@ def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
     )
     result = sweep.run(plan, jobs)
     widest = sorted(result.windows, key=lambda w: w.low - w.high)[:NAMED]
+    unit = plan.subject.units.get("omega", "")
     text = (
-        f"{STEPS} frequencies from {low:.4g} to {high:.4g}, the attractor followed down and up. "
+        f"{STEPS} frequencies from {low:.4g} to {high:.4g}{unit and f' {unit}'}, the attractor "
+        "followed down and up. "
         f"The table has the {NAMED} widest windows."
     )
     name = "frequency-sweep"
-    blocks = [text, _table(widest), figure_block(name, "Over the drive frequency.")]
+    blocks = [text, _table(widest, unit), figure_block(name, "Over the drive frequency.")]
     figure = bifurcation_plots.diagram(result, name=file.title)
     return Evidence("Over the drive frequency", blocks, {name: figure})
 
@@ -52,12 +55,13 @@ def _range(file: ModelFile) -> tuple[float, float]:
     return 0.4 * float(off[0]), max([highest, *wanted])
 
 
-def _table(windows: list[Window]) -> Table | None:
+def _table(windows: list[Window], unit: str) -> Table | None:
     rows = [
         (w.response, _symmetry(w), f"{w.low:.4g}", f"{w.high:.4g}", w.track)
         for w in sorted(windows, key=lambda w: (w.track, w.low))
     ]
-    return table(("response", "kind", "from ω", "to ω", "followed"), rows, numeric=(2, 3))
+    head = ("response", "kind", axis_label("from ω", unit), axis_label("to ω", unit), "followed")
+    return table(head, rows, numeric=(2, 3))
 
 
 def _symmetry(window: Window) -> str:
