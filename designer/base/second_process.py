@@ -14,8 +14,8 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from queue import SimpleQueue
 from threading import Thread
@@ -51,10 +51,12 @@ class Awaited(Generic[Result]):
         return self._known[0]
 
     def wait(self) -> bool:
-        """Wait until the other process has done with it; False at once where it is called here."""
-        if self._there is not None:
-            wait([self._there])
-        return self._there is not None
+        """Wait for the other process; whether it has an answer. False at once where it is called
+        here, or where nobody is asked any more."""
+        try:
+            return self._there is not None and self._there.result() is not None
+        except CancelledError:
+            return False
 
 
 Ask = Callable[..., Awaited[Any]]
@@ -81,9 +83,11 @@ class OtherProcess:
         self._one_at_a_time = ThreadPoolExecutor(1)
 
     def __call__(self, function: Callable[..., Result], *arguments: Any) -> Awaited[Result]:
-        """function(*arguments), there; both must pickle."""
-        there = self._one_at_a_time.submit(self._answer, function, arguments)
-        return Awaited(function, arguments, there)
+        """function(*arguments), there; both must pickle. Here, once this is closed."""
+        with suppress(RuntimeError):
+            there = self._one_at_a_time.submit(self._answer, function, arguments)
+            return Awaited(function, arguments, there)
+        return Awaited(function, arguments)
 
     def _answer(self, function: Callable[..., Result], arguments: object) -> tuple[Result] | None:
         """The result; None where that process has none."""

@@ -59,14 +59,15 @@ class _Deferred(ModuleType):
 def import_cvxpy() -> None:
     """Import cvxpy without what takes longest of it. SciPy's statistics take four times as long as
     all else: one of its atoms calls one function of theirs. OSQP comes with a template engine, and
-    no program here is quadratic: cvxpy takes it as not installed.
+    no program here is quadratic.
 
     Both are there in a process that is not the command line's own, whose other threads might ask
     for them meanwhile, and where a version of cvxpy needs more of them.
     """
     modules: dict[str, ModuleType | None] = sys.modules  # type: ignore[assignment]
-    stand_ins = {STATISTICS: _Deferred(STATISTICS), QUADRATIC: None}
-    if COMMAND_LINE in modules and not stand_ins.keys() & modules.keys():
+    every = {STATISTICS: _Deferred(STATISTICS), QUADRATIC: None}
+    stand_ins = {name: stand_in for name, stand_in in every.items() if name not in modules}
+    if COMMAND_LINE in modules and "cvxpy" not in modules:
         modules |= stand_ins
         try:
             import_module("cvxpy")

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from threading import Thread
+from typing import Any
 
 import numpy as np
 
@@ -79,9 +80,9 @@ def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tu
     mine: dict[int, Recipe] = {}
 
     def hand_out() -> None:
-        for number in left if other(os.getpid).wait() else ():
-            waiting[number] = other(_found_there, pickled, there, number)
-            waiting[number].wait()
+        answer: Awaited[Any] = other(os.getpid)
+        while answer.wait() and (number := next(left, None)) is not None:
+            answer = waiting[number] = other(_found_there, pickled, there, number)
 
     beside = Thread(target=hand_out, daemon=True)
     try:
@@ -93,8 +94,10 @@ def find_recipes(plan: StudyPlan, jobs: int = 1, other: Ask | None = None) -> tu
             mine[number] = _named(bench, number, count)
     finally:
         list(left)  # of those nobody is asked any more
-    beside.join()
-    return tuple(mine[n] if n in mine else waiting[n]() for n in range(count))
+    if len(mine) < count:
+        beside.join()
+    mine |= {number: answer() for number, answer in waiting.items() if answer.wait()}
+    return tuple(mine[n] if n in mine else _named(benches[n], n, count) for n in range(count))
 
 
 def _named(bench: _Bench, number: int, count: int) -> Recipe:

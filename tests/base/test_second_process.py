@@ -8,6 +8,8 @@ import signal
 import socket
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -88,6 +90,15 @@ def test_a_result_is_kept_and_the_function_called_once() -> None:
         told = [answer.wait(), answer(), answer()]
     assert told == [False, None, None]
     assert calls == [1]
+
+
+def test_whoever_waits_goes_on_when_the_process_is_closed() -> None:
+    with ThreadPoolExecutor(2) as pool:
+        with other_process(2) as other:
+            at_work, behind_it = other(time.sleep, 600.0), other(os.getpid)
+            waits = [pool.submit(answer.wait) for answer in (at_work, behind_it)]
+        assert [waited.result(SOON) for waited in waits] == [False, False]
+        assert other(os.getpid)() == HERE
 
 
 @pytest.mark.parametrize("at", ["an import", "a function"])

@@ -15,10 +15,10 @@ Result = TypeVar("Result")
 
 
 class _Done(Awaited[Result]):
-    """Called here, but said to be there already."""
+    """Called here, as if it were there."""
 
-    @property
-    def ready(self) -> bool:
+    def wait(self) -> bool:
+        self()
         return True
 
 

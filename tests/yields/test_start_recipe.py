@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
 from designer.base.proportion import wilson
-from designer.base.second_process import other_process
+from designer.base.second_process import Awaited, other_process
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_values import nominal_board
 from designer.circuit.ensemble import BRIEF, Ensemble
@@ -442,6 +445,31 @@ def test_a_response_in_front_changes_nothing_of_the_others() -> None:
     alone = power_up_block(plan(3), range(4), known[1:], 2)
     both = power_up_block(plan(1, 3), range(4), known, 2)
     assert [replace(r, question=0) for r in both if r.question == 1] == alone
+
+
+@pytest.mark.parametrize("answered", [0, 1, 2, 9])
+def test_each_recipe_is_found_once_and_in_order_whoever_finds_it(
+    monkeypatch: pytest.MonkeyPatch, answered: int
+) -> None:
+    """Half of the threads here, half in a process that ends after so many questions."""
+    found: list[float] = []
+
+    def find(bench: Any) -> float:
+        found.append(bench.question.omega)
+        return found[-1]
+
+    def ask(function: Callable[..., Any], *arguments: Any) -> Awaited[Any]:
+        there: Future[tuple[Any] | None] = Future()
+        asked.append(function)
+        there.set_result((function(*arguments),) if len(asked) <= answered else None)
+        return Awaited(function, arguments, there)
+
+    asked: list[object] = []
+    of = plan(1, 2, 3, 4)
+    monkeypatch.setattr(start_recipe_search, "_find", find)
+    omegas = [each.omega for each in of.questions]
+    assert list(find_recipes(of, 2, ask)) == omegas
+    assert sorted(found) == sorted(omegas)
 
 
 @pytest.mark.parametrize("seed", [0, 0x57A27])
