@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import INK, MUTED, new_figure, styled
+from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
 from designer.base.page import table
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
@@ -101,6 +101,7 @@ def _figure(curves: list[tuple[int, Array, Array]]) -> Figure:
         axes.axvline(n, color=MUTED, lw=0.7, ls=(0, (4, 3)))
         axes.annotate(f"{n}-1-0", (n, 1.0), xycoords=("data", "axes fraction"), ha="center")
     axes.set_yscale("log")
+    plain_numbers(axes.yaxis)
     name_axes(axes, "ω/ω_b", "largest x")
     return figure
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from designer.base.page import Table, table
-from designer.base.units import axis_label
+from designer.base.si_unit import Unit
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
 from designer.dynamics.steady_state import TransientSettings
@@ -33,14 +33,15 @@ def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
     )
     result = sweep.run(plan, jobs)
     widest = sorted(result.windows, key=lambda w: w.low - w.high)[:NAMED]
-    unit = plan.subject.units.get("omega", "")
+    # A diagram of a model in SI units is over hertz.
+    si = plan.subject.si["omega"] if plan.subject.units else Unit("", 1.0)
     text = (
-        f"{STEPS} frequencies from {low:.4g} to {high:.4g}{unit and f' {unit}'}, the attractor "
-        "followed down and up. "
+        f"{STEPS} frequencies from {si.scale * low:.4g} to {si.scale * high:.4g}"
+        f"{si.name and f' {si.name}'}, the attractor followed down and up. "
         f"The table has the {NAMED} widest windows."
     )
     name = "frequency-sweep"
-    blocks = [text, _table(widest, unit), figure_block(name, "Over the drive frequency.")]
+    blocks = [text, _table(widest, si), figure_block(name, "Over the drive frequency.")]
     figure = bifurcation_plots.diagram(result, name=file.title)
     return Evidence("Over the drive frequency", blocks, {name: figure})
 
@@ -55,12 +56,21 @@ def _range(file: ModelFile) -> tuple[float, float]:
     return 0.4 * float(off[0]), max([highest, *wanted])
 
 
-def _table(windows: list[Window], unit: str) -> Table | None:
+def _table(windows: list[Window], unit: Unit) -> Table | None:
     rows = [
-        (w.response, _symmetry(w), f"{w.low:.4g}", f"{w.high:.4g}", w.track)
+        (
+            w.response,
+            _symmetry(w),
+            f"{unit.scale * w.low:.4g}",
+            f"{unit.scale * w.high:.4g}",
+            w.track,
+        )
         for w in sorted(windows, key=lambda w: (w.track, w.low))
     ]
-    head = ("response", "kind", axis_label("from ω", unit), axis_label("to ω", unit), "followed")
+    from_, to = (
+        ("from ω", "to ω") if not unit.name else (f"from [{unit.name}]", f"to [{unit.name}]")
+    )
+    head = ("response", "kind", from_, to, "followed")
     return table(head, rows, numeric=(2, 3))
 
 
