@@ -110,7 +110,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         long = any(item.get_closest_marker(name) for name in LONG)
         work[item.path] += A_LONG_ONE if long else A_TEST
         if long:
-            known[item.path] = SECONDS.get(item.path.relative_to(TESTS).as_posix(), 0.0)
+            name = item.path.as_posix().removeprefix(f"{TESTS.as_posix()}/")
+            known[item.path] = SECONDS.get(name, 0.0)
     items.sort(key=lambda item: (-max(work[item.path], known.get(item.path, 0.0)), item.path))
 
 

@@ -22,9 +22,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from contextvars import ContextVar, Token
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, Self, TypeVar
 
+from designer.base.errors import InputError
 from designer.base.printed import printable, tell
 
 if TYPE_CHECKING:
@@ -207,7 +208,7 @@ class Progress:
     _sought: Sought | None = None
     _work: WholeWork | None = None
     _ended: threading.Event | None = None
-    _token: Token[Progress | None] | None = None
+    _told: AbstractContextManager[None] | None = None
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         """A stage begins, with ``total`` steps if that is known; call the result at each step."""
@@ -270,7 +271,8 @@ class Progress:
     def __enter__(self) -> Self:
         self._stage = ProgressStage(None, self._say, self._clock)
         self._stage.detail = "starting"
-        self._token = _WATCHED.set(self)
+        self._told = report_to(self)
+        self._told.__enter__()
         self._ended = threading.Event()
         threading.Thread(target=self._watch, args=(self._ended,), daemon=True).start()
         return self
@@ -278,9 +280,9 @@ class Progress:
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         if self._ended is not None:
             self._ended.set()
-        if self._token is not None:
-            _WATCHED.reset(self._token)
-            self._token = None
+        if self._told is not None:
+            self._told.__exit__(None, None, None)
+            self._told = None
 
     def _say(self, line: str) -> None:
         """A line about the stage."""
@@ -305,28 +307,38 @@ _WATCHED: ContextVar[Progress | None] = ContextVar("watched", default=None)
 """Who is told."""
 _PARTS: ContextVar[tuple[str, ...]] = ContextVar("parts", default=())
 """The parts of the work that are under way, the outermost first; a thread beside has its own."""
+_WITHIN: ContextVar[Progress | None] = ContextVar("within", default=None)
+"""Who hears of no stage for now (`within_stage`)."""
 
 
 @contextmanager
 def report_to(progress: Progress | None) -> Iterator[None]:
-    """Inside, this one is told of the work; None: whoever is told already."""
-    if progress is None:
+    """Inside, this one is told of the work, which is no part of another's; None: whoever is told
+    already."""
+    if progress is None or progress is _WATCHED.get():
         yield
         return
-    token = _WATCHED.set(progress)
+    told, parts = _WATCHED.set(progress), _PARTS.set(())
     try:
         yield
     finally:
-        _WATCHED.reset(token)
+        _PARTS.reset(parts)
+        _WATCHED.reset(told)
 
 
 def reported(function: Callable[P, Result]) -> Callable[P, Result]:
-    """The function, which tells of its work whom its keyword ``progress`` names (`report_to`)."""
+    """The function, which tells of its work whom its keyword ``progress`` names (`report_to`).
+
+    Raises
+    ------
+    InputError : ``progress`` is something else.
+    """
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> Result:
         progress = kwargs.get("progress")
-        assert progress is None or isinstance(progress, Progress)
+        if not (progress is None or isinstance(progress, Progress)):
+            raise InputError(None, "progress", repr(progress), "a designer.base.progress.Progress")
         with report_to(progress):
             return function(*args, **kwargs)
 
@@ -339,14 +351,28 @@ def is_watched() -> bool:
 
 
 def watched() -> Progress:
-    """Who is watched; where nobody is, one that tells the log alone. Threads beside ask before they
-    begin."""
+    """Who is watched; where nobody is, one that tells the log alone. Threads beside, but for those
+    of ``threads.parallel``, ask before they begin."""
     return _WATCHED.get() or Progress()
 
 
 def stage(text: str, total: int | None = None) -> Callable[[], None]:
-    """As of ``Progress.stage``."""
-    return watched().stage(text, total)
+    """As of ``Progress.stage``; inside `within_stage` it is what the stage works on just now."""
+    told = watched()
+    if _WITHIN.get() is told:
+        told.doing(text)
+        return lambda: None
+    return told.stage(text, total)
+
+
+@contextmanager
+def within_stage() -> Iterator[None]:
+    """Inside, the stages of what is done are none of their own, but belong to the one under way."""
+    token = _WITHIN.set(_WATCHED.get())
+    try:
+        yield
+    finally:
+        _WITHIN.reset(token)
 
 
 def whole(usual: Mapping[str, float]) -> AbstractContextManager[None]:

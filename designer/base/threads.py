@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -27,12 +28,14 @@ def parallel(
     function: Callable[[Item], Result], items: Iterable[Item], jobs: int
 ) -> Iterator[Result]:
     """function(item) for each item, in order, by ``jobs`` threads; a function may call it again.
+    Who is told of the caller's work (``progress``) is told of theirs.
 
     Ctrl-C, or leaving the iterator, stops the flows that are under way within a second.
     """
     with _counted():
         pool = ThreadPoolExecutor(jobs)
-        futures = [pool.submit(function, item) for item in items]
+        # A copy for each: two threads cannot be in one context at once.
+        futures = [pool.submit(copy_context().run, function, item) for item in items]
         try:
             for future in futures:
                 yield future.result()

@@ -19,6 +19,9 @@ REACH = 5.0
 """How far a slider without finite ends goes: from 1/5 of the file's value to 5 times it."""
 MARGIN = 1e-3
 """How far from the ends of an open interval a slider stays."""
+MOST_ASKED = 30
+"""Points of laws and entries of matrices that have a slider at most: an address may name any number
+of them, and the page waits for the ends of each."""
 SENT = 6
 """Digits of what the page sends when a slider is moved."""
 LOWEST, HIGHEST = 0.1, 2.5
@@ -67,9 +70,15 @@ class Control:
 
 def controls(modelfile: ModelFile, asked: Collection[str] = ()) -> tuple[Control, ...]:
     """One for ω, then one for every parameter, those of the drive first; of points of laws and
-    entries of matrices those that are ``asked`` for."""
+    entries of matrices the first `MOST_ASKED` of those that are ``asked`` for."""
+    listed = modelfile.model.listed
+    wanted = [name for name in dict.fromkeys(asked) if name in listed]
+    left_out = listed.difference(wanted[:MOST_ASKED])
     place, subject = first_place(modelfile), ModelSubject(modelfile.model, scales=modelfile.si)
-    each = [_of_omega(modelfile, place, subject), *_parameters(place.model, subject.units, asked)]
+    each = [
+        _of_omega(modelfile, place, subject),
+        *_parameters(place.model, subject.units, left_out),
+    ]
     return tuple(sorted(each, key=lambda control: not control.drive))
 
 
@@ -118,10 +127,10 @@ def _of_omega(modelfile: ModelFile, place: ModelPlace, subject: ModelSubject) ->
 
 
 def _parameters(
-    model: MechanicalModel, units: Mapping[str, str], asked: Collection[str]
+    model: MechanicalModel, units: Mapping[str, str], left_out: Collection[str]
 ) -> Iterator[Control]:
     for name, (least, most) in model.parameters.items():
-        if name in model.listed and name not in asked:
+        if name in left_out:
             continue
         value = model.parameter(name)
         low, high, logarithmic = _range(value, least, most)

@@ -207,7 +207,7 @@ def page(
         modelfile,
         styles=Markup(f'<link rel="stylesheet" href="{css}">'),
         scripts=Markup("".join(f'<script src="{name}"></script>' for name in scripts)),
-        shown=controls(modelfile, asked),
+        asked=asked,
         losses=losses,
     )
 
@@ -226,7 +226,6 @@ def recorded_page(
         modelfile,
         styles=Markup(f"<style>{asset('explore.css')}</style>"),
         scripts=Markup(loads),
-        shown=tuple(each for each in controls(modelfile) if each.name == OMEGA),
         recording=recording,
         losses=losses,
         allowed=[script_source(script) for script in scripts],
@@ -238,13 +237,14 @@ def _render(
     *,
     styles: Markup,
     scripts: Markup,
-    shown: tuple[Control, ...],
+    asked: Collection[str] = (),
     recording: Message | None = None,
     losses: FolderLosses | None = None,
     allowed: Sequence[str] = (),
 ) -> str:
-    each = controls(modelfile, [control.name for control in shown])
+    each = controls(modelfile, asked)
     (omega,) = (control for control in each if control.name == OMEGA)
+    shown = each if recording is None else (omega,)
     motions = shown_motions(first_place(modelfile).model.second_order())
     if recording is not None:
         motions = motions[: len(recording["views"][0]["motions"])]

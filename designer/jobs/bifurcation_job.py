@@ -185,7 +185,7 @@ class BifurcationWork:
         if self.folder is None:
             return None
         path, vouches = self.folder.path, self.folder.vouches
-        files = WorkFiles(path, self.hash, self.provenance, progress.watched().note, vouches)
+        files = WorkFiles(path, self.hash, self.provenance, progress.note, vouches)
         return blocks(plan, files)
 
 

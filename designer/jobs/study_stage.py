@@ -289,7 +289,7 @@ def read_study(path: Path, synthesis: Synthesis, place: Place) -> Study:
     fidelity = stage.inputs.get("rung", "exact")
     options = Options(stage.inputs["seed"], samples=samples, rung=fidelity, blame=False)
     help_ = StudyHelp(options.workers, None, LocalRunner(options.workers))
-    with progress.report_to(progress.Progress()):  # its stages are no stages of this work
+    with progress.within_stage():
         return study_of(synthesis, options, help_, check(synthesis, None), stores)
 
 

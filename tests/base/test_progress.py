@@ -5,9 +5,12 @@ from __future__ import annotations
 import io
 import re
 import sys
+import threading
 
 import pytest
 
+from designer.base import progress
+from designer.base.errors import InputError
 from designer.base.progress import (
     EVERY,
     MINUTE,
@@ -17,13 +20,18 @@ from designer.base.progress import (
     Terminal,
     WholeWork,
     best_so_far,
+    doing,
     how_far,
     note,
     part,
     progress_for,
     rate,
+    report_to,
+    reported,
     seeking,
+    within_stage,
 )
+from designer.base.threads import parallel
 
 
 @pytest.mark.parametrize(
@@ -263,3 +271,69 @@ def test_a_note_reaches_who_is_watched(capsys: pytest.CaptureFixture[str]) -> No
     with seeking("anything"), ProgressLines():
         note("parts stand")
     assert capsys.readouterr().err == "parts stand\n"
+
+
+def test_a_note_from_a_thread_of_parallel_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
+    """Once, and from a thread of its threads too."""
+    met = threading.Barrier(2, timeout=60.0)
+
+    def work(number: int) -> None:
+        met.wait()  # two threads at once
+        list(parallel(lambda own: note(f"{number}, {own}"), range(2), 2))
+
+    with ProgressLines():
+        list(parallel(work, range(2), 2))
+    assert sorted(capsys.readouterr().err.splitlines()) == ["0, 0", "0, 1", "1, 0", "1, 1"]
+
+
+def test_parts_of_a_work_are_not_told_to_who_is_told_of_another(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    now = [0.0]
+    outer, inner = ProgressLines(lambda: now[0]), ProgressLines(lambda: now[0])
+
+    def told(lines: ProgressLines) -> str:
+        now[0] += SILENCE
+        lines.beat()
+        return capsys.readouterr().err.splitlines()[-1].partition(" so far: ")[2]
+
+    with report_to(outer), part("outer"):
+        outer.stage("design")
+        with report_to(inner):
+            inner.stage("study")
+            with part("inner"):
+                doing("x")
+                assert told(inner) == "inner, x"
+        with report_to(outer):
+            doing("y")
+        assert told(outer) == "outer, y"
+
+
+def test_a_work_within_a_stage_has_no_stages_but_is_not_silent(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    now = [0.0]
+    lines = ProgressLines(lambda: now[0])
+    with report_to(lines), part("read back"):
+        progress.stage("report")
+        with within_stage():
+            step = progress.stage("boards", 3)
+            step()
+            now[0] += SILENCE
+            lines.beat()
+            note("a damaged block")
+            with report_to(ProgressLines()):
+                progress.stage("another's")
+        progress.stage("pictures")
+    said = ["report …", "  0:00:10 so far: read back, boards", "a damaged block", "another's …"]
+    assert capsys.readouterr().err.splitlines() == [*said, "pictures …"]
+
+
+def test_who_is_to_be_told_is_a_progress() -> None:
+    @reported
+    def verb(*, progress: object = None) -> str:
+        return "done"
+
+    assert verb(progress=None) == verb(progress=Progress()) == "done"
+    with pytest.raises(InputError, match=r"progress: found .*print.*, expected a designer\.base"):
+        verb(progress=print)

@@ -179,6 +179,14 @@ def test_points_and_entries_have_no_slider_and_are_in_the_address_where_they_wer
         read_place(LISTS, {"mass.tip.tip": "0"})
 
 
+def test_an_address_may_ask_for_so_many_sliders(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first; those that are there anyway, and words that are no parameters, count for none."""
+    monkeypatch.setattr("designer.explorer.controls.MOST_ASKED", 2)
+    always = {"omega", "b", "tip.amplitude", "tip.constant"}
+    asked = ["b", "no such", "mass.tip.tip", "mass.tip.tip", "F.x3", "F.f3"]
+    assert {c.name for c in controls(LISTS, asked)} == always | {"mass.tip.tip", "F.x3"}
+
+
 def test_a_file_that_wants_nothing_is_looked_at_where_the_model_resonates() -> None:
     modelfile = parse_model_file(f"format = 1\n{PAPER_TABLE}")
     assert first_place(modelfile).omega == 1.0
