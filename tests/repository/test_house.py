@@ -83,7 +83,7 @@ REACH = {
     "reproduce": 57_450,
     "rules": 53_850,
     "explore": 52_200,
-    "bench": 57_150,
+    "bench": 57_200,
     "trade": 61_450,
     "export": 59_900,
     "synthesise": 51_900,
