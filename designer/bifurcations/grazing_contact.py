@@ -81,7 +81,7 @@ def _nodes(flow: Flow, contact: GrazingContact) -> int:
     """Nodes in a drive period: a step of the general kernel apart, in contact too."""
     rest = flow.system.mode(flow.system.start)
     guards = [g for g in rest.guards if g.clearance == contact.clearance]
-    contacts = [flow.system.mode(g.target) for g in guards or flow.system.corners]
+    contacts = [flow.system.mode(g.target) for g in guards] or flow.system.modes_beyond
     step = min(step_length(mode.A, flow.fastest) for mode in (rest, *contacts))
     return int(np.clip(np.ceil(flow.drive.period / step), FEWEST, MOST))
 
@@ -89,15 +89,10 @@ def _nodes(flow: Flow, contact: GrazingContact) -> int:
 def _mode(flow: Flow, x: Array, angle: float, contact: GrazingContact) -> Mode:
     """The mode about the turning point: the one at x but for the contact at the stop itself."""
     system = flow.system
-    mode = system.mode(flow.mode_at(x, angle))
-    if contact.clearance >= len(system.clearances):
-        # The guard of the piece within leads away from rest, that of the piece beyond back.
-        corner = system.corners[contact.clearance - len(system.clearances)]
-        across = (
-            g for g in mode.guards
-            if g.corner == corner.corner and (g.C @ corner.C < 0.0) == contact.tip
-        )  # fmt: skip
-        return next((system.mode(guard.target) for guard in across), mode)
+    key, number = flow.mode_at(x, angle), contact.clearance - len(system.clearances)
+    if number >= 0:
+        return system.at_corner(number, key, beyond=not contact.tip)
+    mode = system.mode(key)
     wanted = 0 if contact.tip else contact.side
     if mode.sides[contact.clearance] == wanted:
         return mode

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -242,23 +244,23 @@ def _with_corners(system: PiecewiseLinearSystem, design: Design) -> PiecewiseLin
     """The nominal board, its guards at corners of the model's laws marked as those of the model."""
     corners = _corners(design)
 
+    def at(key: ModeKey, target: ModeKey) -> ForceCorner | None:
+        turned = set(enumerate(key)) ^ set(enumerate(target))
+        return next((corners[each] for each in turned if each in corners), None)
+
     def build(key: ModeKey) -> Mode:
         mode = system.mode(key)
-        changed = (
-            next(
-                i for i, both in enumerate(zip(key, guard.target, strict=True)) if len({*both}) > 1
-            )
-            for guard in mode.guards
+        return replace(
+            mode, guards=tuple(replace(g, corner=at(key, g.target)) for g in mode.guards)
         )
-        pairs = zip(mode.guards, changed, strict=True)
-        return replace(mode, guards=tuple(replace(g, corner=corners.get(i)) for g, i in pairs))
 
     return replace(system, build=build, _modes={}) if corners else system
 
 
-def _corners(design: Design) -> dict[int, ForceCorner]:
-    """By the number of the switch with which a dead zone begins; places as the model has them."""
-    model, circuit, found = design.model.second_order(), design.circuit, dict[int, ForceCorner]()
+def _corners(design: Design) -> dict[tuple[int, int], ForceCorner]:
+    """By the switch with which a dead zone begins, its number and its position in contact; places
+    as the model has them."""
+    model, circuit = design.model.second_order(), design.circuit
     laws = {law.name: (np.array(law.row), law.corners) for law in model.laws if not law.curved}
     risen = {
         clearance.name: (
@@ -267,12 +269,22 @@ def _corners(design: Design) -> dict[int, ForceCorner]:
         )
         for clearance in model.clearances
     }
+    found = dict[tuple[int, int], ForceCorner]()
+    carrying = defaultdict[tuple[str, int], list[tuple[float, list[tuple[int, int]]]]](list)
     for zone, stop in zip(model.dead_zones, circuit.dead_zones, strict=True):
         row, places = (laws | risen).get(zone.bend_of, (np.zeros(0), ()))
         ends = dict(zone.sides)
-        for side, contact in stop.contacts if places else ():
-            switch = circuit.switches.index(contact.switch)
-            place = side * ends[side].gap * float(row[zone.mass])
+        for side, contact in stop.contacts:
+            switches = ((contact.switch, contact.position), *contact.others)
+            own = [(circuit.switches.index(name), position) for name, position in switches]
+            gap, stages = ends[side].gap, carrying[stop.bend_of or stop.clearance, side]
+            stages.append((gap, own))
+            place = side * gap * float(row[zone.mass]) if places else 0.0
             if np.isclose(place, places, rtol=ROUNDING, atol=0.0).any():
-                found[switch] = ForceCorner(switch, place, zone.bend_of)
+                # Two stages may share a corner: then neither knows which one is met first.
+                met = (each for at, each in stages if at < gap * (1.0 - ROUNDING))
+                before = tuple(chain.from_iterable(met))
+                still = tuple((i, circuit.open[i]) for i, _ in own)
+                corner = ForceCorner(place, zone.bend_of, (*before, *still), (*before, *own))
+                found[own[0]] = corner
     return found

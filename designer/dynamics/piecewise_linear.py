@@ -45,11 +45,18 @@ ModeKey = tuple[int, ...]
 class ForceCorner:
     """Where a force bends that no contact begins or ends."""
 
-    index: int
-    """Of the force in a ``ModeKey``."""
     place: float
     """Of what the force depends on."""
     force: str
+    within: tuple[tuple[int, int], ...]
+    """What stands in a ``ModeKey`` on the side of rest, each with its index there."""
+    beyond: tuple[tuple[int, int], ...]
+    """The same on the other side. On a board two diodes turn, one after the other."""
+
+    def key(self, near: ModeKey, *, beyond: bool) -> ModeKey:
+        """Key of the mode on one side, other forces and contacts as in ``near``."""
+        own = dict(self.beyond if beyond else self.within)
+        return tuple(own.get(i, entry) for i, entry in enumerate(near))
 
     def __str__(self) -> str:
         return f"{self.force} at {self.place:.6g}"
@@ -324,6 +331,17 @@ class PiecewiseLinearSystem:
                 elif guard.clearance >= 0 and key == self.start:
                     keys.append(guard.target)
         return tuple(found.values())
+
+    def at_corner(self, number: int, near: ModeKey, *, beyond: bool) -> Mode:
+        """The mode on one side of one of ``corners``; as of ``ForceCorner.key``."""
+        corner = self.corners[number].corner
+        assert corner is not None
+        return self.mode(corner.key(near, beyond=beyond))
+
+    @property
+    def modes_beyond(self) -> list[Mode]:
+        """Those beyond each of ``corners`` alone."""
+        return [self.at_corner(k, self.start, beyond=True) for k in range(len(self.corners))]
 
     @cached_property
     def corner_images(self) -> tuple[int, ...]:

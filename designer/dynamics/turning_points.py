@@ -163,12 +163,12 @@ def corner_crossings(flow: Flow, orbit: Orbit) -> tuple[int, ...]:
 
 
 def _rate(flow: Flow, orbit: Orbit) -> float:
-    """Largest modulus of an eigenvalue, of the open mode and of those that it leads to."""
+    """Largest modulus of an eigenvalue, of the open mode, of those that it leads to, and of those
+    beyond corners."""
     rest = flow.system.mode(flow.system.start)
     keys = {orbit.mode or flow.system.start, *(g.target for g in rest.guards if g.clearance >= 0)}
-    keys |= {corner.target for corner in flow.system.corners}
-    matrices = [rest.A, *(flow.system.mode(key).A for key in keys)]
-    return max(float(np.abs(np.linalg.eigvals(A)).max()) for A in matrices)
+    modes = [rest, *map(flow.system.mode, keys), *flow.system.modes_beyond]
+    return max(float(np.abs(np.linalg.eigvals(mode.A)).max()) for mode in modes)
 
 
 def _derivatives(flow: Flow, x: Array, angle: Array) -> tuple[Array, Array, Index, list[ModeKey]]:

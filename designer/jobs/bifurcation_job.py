@@ -139,6 +139,10 @@ class BifurcationWork:
         if isinstance(plan, SweepPlan):
             self.curves = curve_plan(request, plan, modelfile)
             more = {"points": request.points}
+            if request.points and isinstance(plan.subject, BoardSubject):
+                # A word of its own: earlier versions found none on boards.
+                corners = [str(guard.corner) for guard in plan.subject.system.corners]
+                more |= {"corners": corners} if corners else {}
             more |= {} if self.curves is None else {"and": self.curves.as_dict()}
             self.region = region_at(request, plan, modelfile)
             more |= {} if self.region is None else {"region": self.region}

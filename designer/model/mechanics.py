@@ -616,7 +616,8 @@ class _Contact:
         clearance = self.clearance if touches else -1
         place = -sign * constant
         bends = clearance < 0 and place in self.corners
-        corner = ForceCorner(index, place, self.name) if bends else None
+        sides = (((index, each),) for each in sorted((key[index], level), key=abs))
+        corner = ForceCorner(place, self.name, *sides) if bends else None
         row = sign * self.row, sign * self.on_drive, constant
         return Guard(*row, target, clearance, corner=corner)
 

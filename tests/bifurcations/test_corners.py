@@ -13,6 +13,7 @@ from scipy.optimize import brentq, fsolve
 from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.conditions import grazings
+from designer.bifurcations.grazing_contact import GrazingContact, height
 from designer.bifurcations.plane_curves import PlaneCurve, PlaneWindow, continued
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import all_windows
@@ -21,7 +22,7 @@ from designer.dynamics.attractors import settle
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.plots.point_captions import caption
-from tests.shared.rule_cases import bent
+from tests.shared.rule_cases import HOLDING, bent
 from tests.shared.system_text import clearance, system_text, table
 
 JOINT = ("a", "ground")
@@ -120,6 +121,39 @@ def test_a_corner_of_a_law_on_a_board() -> None:
         omega = 2.0 * math.pi * hertz * design.errors.scales.seconds
         wanted = 0.5 * amplitude_at_corner(omega, 7.0)
         assert given / volts == pytest.approx(wanted, rel=2.0 * design.errors.max_error)
+
+
+LAWS = {
+    "one bend": HOLDING,
+    "limits": ((-1.0, -0.3), (-0.5, -0.3), (0.5, 0.3), (1.0, 0.3)),
+    "hardens": ((-1.0, -3.3), (-0.5, -0.3), (0.5, 0.3), (1.0, 3.3)),
+    "two bends": ((-1.0, -1.3), (-0.5, -0.3), (0.5, 0.3), (0.8, 1.2), (1.0, 3.3)),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_motion_on_either_side_of_a_corner_on_a_board(law: str) -> None:
+    """A tip is of the mode within and a dip of that beyond, on whichever side of the corner, or
+    between the two diodes, the motion is: the modes that hold where no diode of the stage is about
+    to turn."""
+    board = BoardSubject(bent(0.01, LAWS[law]).synthesis.design, 200.0)
+    flow, system = board.family("amplitude").flow(board.amplitude), board.system
+    period, first = flow.drive.period, len(system.clearances)
+    assert len(system.corners) == len(LAWS[law]) - 2
+    for k, corner in enumerate(system.corners):
+        place = -corner.e * corner.C / (corner.C @ corner.C)
+        states = [share * place for share in (0.999, 1.000001, 1.001)]
+        keys = [flow.mode_at(x, 0.0) for x in states]
+        assert len(set(keys)) == 3
+        within, _, beyond = map(system.mode, keys)
+        assert system.modes_beyond[k] is beyond
+        for x in states:
+            for tip, mode in ((True, within), (False, beyond)):
+                found = height(flow, x, 1, GrazingContact(first + k, 1, tip), 0.0)
+                rate = mode.A @ x + mode.d
+                bend = mode.A @ rate + mode.B * flow.drive.amplitude * flow.drive.omega
+                wanted = [corner.C @ x + corner.e, period * corner.C @ rate]
+                assert found == pytest.approx([*wanted, period**2 * corner.C @ bend], rel=1e-9)
 
 
 def test_a_branch_that_ends_where_a_stop_pushes_at_once() -> None:

@@ -21,6 +21,8 @@ from designer.bifurcations.parameter_map import MapCell, MapPlan
 from designer.bifurcations.plane_curves import PlaneWindow
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.sweep import SweepPlan
+from designer.circuit.swept_board import BoardSubject
+from designer.design_rules.rule_subject import RuleSubject
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import SteadyMotion, TransientSettings
 from designer.folders import sweep_store
@@ -32,9 +34,12 @@ from designer.folders.sweep_store import (
     share_blocks,
     sweep_blocks,
 )
+from designer.jobs.bifurcation_job import BifurcationWork
+from designer.jobs.bifurcation_request import Request, plan_of
 from designer.model.swept_model import ModelSubject
 from tests.dynamics.test_modal_tables import PAPER
 from tests.shared.resealed import Change, reseal, with_value
+from tests.shared.rule_cases import base, bent
 
 SUBJECT = ModelSubject(PAPER)
 QUICK = TransientSettings(40, 16, 400)
@@ -309,6 +314,24 @@ def test_blocks_of_earlier_rules_are_left(monkeypatch: pytest.MonkeyPatch) -> No
         monkeypatch.setattr(sweep_store, "RULES", rules)
         codes.add(sweep_store.work_hash(SWEEP.as_dict()))
     assert len(codes) == 4
+
+
+def test_blocks_of_a_board_without_its_corners_are_left() -> None:
+    """By earlier versions a board's laws had none. What was made without points, or of a board
+    without such laws, stays."""
+
+    def decides(of: RuleSubject, *, points: bool = True) -> dict[str, Any]:
+        made = of.synthesis
+        low, high = map(made.design.errors.scales.frequency, (1.0, 1.2))
+        request = Request(circuit=True, from_=low, to=high, steps=3, points=points)
+        plan = plan_of(request, BoardSubject(made.design), made.modelfile)
+        return BifurcationWork(request, plan, made.modelfile, 1).decides
+
+    assert decides(bent(0.01))["corners"] == ["K at 0.5"]
+    limits = ((-1.0, -0.3), (-0.5, -0.3), (0.5, 0.3), (1.0, 0.3))
+    assert decides(bent(0.01, limits))["corners"] == ["K at 0.5", "K at -0.5"]
+    assert "corners" not in decides(bent(0.01), points=False)
+    assert "corners" not in decides(base())
 
 
 def test_keys_of_a_curve_that_nobody_knows_are_left() -> None:

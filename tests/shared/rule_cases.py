@@ -259,7 +259,7 @@ damping = 0.2
 [[law]]
 name = "K"
 between = ["a", "ground"]
-points = [[-1.0, -6.0], [0.5, 3.0], [1.0, 3.0]]
+points = POINTS
 [[force]]
 on = "a"
 amplitude = 1.0
@@ -268,16 +268,19 @@ omega = 2.3
 [circuit]
 dead_zone = "rectifier"
 """
+"""A mass on a spring, and on a law."""
+HOLDING = ((-1.0, -6.0), (0.5, 3.0), (1.0, 3.0))
 """A law that is six times as stiff as the spring beside it, and past 0.5 no more."""
 
 
 @cache
-def bent(grade: float) -> RuleSubject:
-    """The exact circuit of ``BENT``, of resistors of this grade."""
-    model = parse_model_file(BENT).model
+def bent(grade: float, points: tuple[tuple[float, float], ...] = HOLDING) -> RuleSubject:
+    """The exact circuit of ``BENT`` with a law through these points, of resistors of this grade."""
+    text = BENT.replace("POINTS", str([list(point) for point in points]))
+    model = parse_model_file(text).model
     circuit = exact_circuit(model.second_order(), Scale(1e-3, np.array([4.0, 3.0]), 2.0))
     circuit = valued(replace(circuit, saturation=13.0), bought(circuit.values))
-    subject = subject_of(circuit, model, BENT)
+    subject = subject_of(circuit, model, text)
     return RuleSubject(subject.synthesis, subject.circuit, _of_grade(subject.components, grade))
 
 
