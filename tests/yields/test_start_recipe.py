@@ -468,8 +468,8 @@ def test_each_recipe_is_found_once_and_in_order_whoever_finds_it(
     of = plan(1, 2, 3, 4)
     monkeypatch.setattr(start_recipe_search, "_find", find)
     omegas = [each.omega for each in of.questions]
-    answers: list[Any] = list(find_recipes(of, 2, ask))
-    assert answers == omegas
+    given: list[Any] = list(find_recipes(of, 2, ask))
+    assert given == omegas
     assert sorted(found) == sorted(omegas)
 
 
