@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,31 @@ def test_a_design_that_breaks_the_rule_is_caught_and_a_near_miss_is_not(id_: str
     # The near miss is near, or a count that is at its limit.
     if caught.rule.unit or caught.limit not in (0.0, 1.0):
         assert kept.value == pytest.approx(caught.value, rel=0.1, abs=0.05)
+
+
+@pytest.mark.parametrize(("driven", "lost"), [(True, 0), (False, 1)])
+def test_an_input_floats_where_its_resistors_lead_to_nothing_that_drives(
+    driven: bool, lost: int
+) -> None:
+    """Two resistors in a row from it, with an output behind them or an open end."""
+
+    def pin(net: str, electrical: str = "passive") -> SimpleNamespace:
+        return SimpleNamespace(net=net, electrical=electrical, name="+", unit="A")
+
+    def part(reference: str, kind: str, *pins: SimpleNamespace) -> SimpleNamespace:
+        return SimpleNamespace(reference=reference, kind=kind, pins=pins)
+
+    subject: Any = SimpleNamespace(
+        circuit=SimpleNamespace(generator_nets=("u",)),
+        components=[
+            part("R1", "resistor", pin("a"), pin("b")),
+            part("R2", "resistor", pin("b"), pin("c")),
+            part("U1", "op-amp", pin("c", "input")),
+            part("U2", "op-amp", pin("a" if driven else "d", "output")),
+        ],
+    )
+    (found,) = on_nets.floating_inputs(subject)
+    assert (found.value, found.where) == (lost, "U1A (+)" if lost else "")
 
 
 def test_the_design_that_pairs_start_from_keeps_every_rule() -> None:

@@ -19,7 +19,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless, SiScales
-from designer.model.response_table import Response, placed
+from designer.model.response_table import HertzResponse, Response, placed
+from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict, judge
 from tests.circuit.test_coefficients import exact_for_paper
@@ -47,6 +48,19 @@ def without_period(status: OrbitStatus, least: float | None = None) -> Response:
 
 TORUS = Orbit(OrbitStatus.QUASI_PERIODIC, lyapunov=0.0, lyapunov_error=1e-4)
 CHAOS = without_period(OrbitStatus.APERIODIC)
+
+
+def test_ngspice_has_the_op_amps_of_the_boards_and_its_steps_fill_a_period() -> None:
+    of = plan()
+    assert of.fidelity == "ideal"
+    assert replace(of, bandwidth=True).fidelity == "dynamic"
+    settings = SolverSettings("gear", 1.0 / (500.0 * of.questions[0].excitation.frequency))
+    assert replace(of.questions[0], settings=settings).steps == pytest.approx(500.0)
+
+
+def test_a_drive_frequency_for_people_is_in_hertz_where_the_model_is() -> None:
+    assert HertzResponse(72.0 * math.pi).place_text() == "36 Hz"
+    assert Response(0.85).place_text() == "ω = 0.85"
 
 
 @pytest.mark.parametrize(
