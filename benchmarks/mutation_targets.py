@@ -59,7 +59,11 @@ GROUPS: Mapping[str, tuple[Target, ...]] = {
         *_of(
             "synthesis", "dead_zone_target", "synthesis/nonlinear_block linear_network/term_search"
         ),
-        *_of("synthesis", "side_conditions limits", "synthesis/side_conditions design_rules/rules_circuit"),
+        *_of(
+            "synthesis",
+            "side_conditions limits",
+            "synthesis/side_conditions design_rules/rules_circuit",
+        ),
         *_of("synthesis", "scale_choice scale_box", "synthesis/scale_choice"),
     ),
     "verdicts": (
