@@ -167,6 +167,8 @@ def test_a_board_without_an_answer_is_neither_lost_nor_fine(
     found = [estimated(monkeypatch, 13, lost, seed) for seed in range(6)]
     assert np.mean([r.lost for r in found]) == pytest.approx(truth, rel=0.2)
     assert np.mean([r.unanswered for r in found]) == pytest.approx(truth, rel=0.2)
+    for estimate, low, high in (r.per_million for r in found):
+        assert 0.0 < low < estimate < high < 1e6
 
 
 @pytest.mark.parametrize("threshold", [0.0, 0.8])
