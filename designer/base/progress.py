@@ -394,32 +394,31 @@ def doing(text: str) -> None:
 @contextmanager
 def part(text: str) -> Iterator[None]:
     """What is worked on inside belongs to this part, such as "without swing"."""
-    watched = _WATCHED.get()
-    if watched is None:
+    if (told := _WATCHED.get()) is None:
         yield
         return
     above = _PARTS.set((*_PARTS.get(), text))
-    watched.doing("")
+    told.doing("")
     try:
         yield
     finally:
         _PARTS.reset(above)
-        watched.forget_parts()
+        told.forget_parts()
 
 
 @contextmanager
 def seeking(what: str) -> Iterator[None]:
     """Inside, `best_so_far` says how good an answer is known, such as to "parts"; a search within
     another one is a part of it."""
-    watched = _WATCHED.get()
-    if watched is None or watched._sought is not None:
+    told = _WATCHED.get()
+    if told is None or told._sought is not None:
         yield
         return
-    watched._sought = Sought(what, watched._clock)
+    told._sought = Sought(what, told._clock)
     try:
         yield
     finally:
-        watched._sought = None
+        told._sought = None
 
 
 def best_so_far(text: str, *, step: bool = False) -> None:
